@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Footer, Message, Schema
-from mcap.stream_reader import breakup_chunk, StreamReader
+from mcap.stream_reader import breakup_chunk, MAGIC_SIZE, StreamReader
 
 from scenario_gen.bags.storage.config import ReadBudget
 from scenario_gen.bags.storage.messages import BagMessage, BagTopic
@@ -83,6 +83,7 @@ class McapFile:
         channels: dict[int, Channel] = {}
         counts: Counter[int] = Counter()
         offset = 0
+        lines = []
         try:
             for record in self._records():
                 offset = self._stream.tell()
@@ -96,11 +97,15 @@ class McapFile:
             raise
         except Exception as error:
             self._end = offset
-            self.missing = (
+            lines.append(
                 f"{self._path}: not closed by its recorder, cut off or damaged: what follows byte "
                 f"{offset} of {self._size} is missing ({describe(error)}); `mcap recover "
                 f"{self._path.name}` makes a whole file of it"
             )
+        if unnamed := counts.keys() - channels.keys():
+            count = sum(counts[number] for number in unnamed)
+            lines.append(f"{self._path}: damaged, the topic of {count} messages is missing")
+        self.missing = "; ".join(lines)
         return self._topics(schemas, channels, counts)
 
     def _records(self) -> Iterator[Any]:
@@ -115,6 +120,8 @@ class McapFile:
         reader = StreamReader(self._stream, emit_chunks=True, record_size_limit=limit)
         for record in reader.records:
             if isinstance(record, Footer):
+                if (rest := self._size - self._stream.tell() - MAGIC_SIZE) > 0:
+                    raise McapError(f"{rest} bytes follow the footer")
                 return
             if isinstance(record, Chunk):
                 self._check_size(record)
@@ -172,19 +179,15 @@ class McapFile:
         messages = self._messages_by_time([topic.name for topic in topics])
         n_missing = sum(topic.count for topic in topics)
         remedy = f"`mcap recover {self._path.name}` saves what is whole"
-        while True:
-            with guarded(f"{self._path}: damaged", remedy=remedy):
-                message = next(messages, None)
-                if message is None:
-                    if n_missing > 0:  # mcap skips what it does not know in a chunk
-                        raise McapError(f"{n_missing} messages cannot be read")
-                    return
+        with guarded(f"{self._path}: damaged", remedy=remedy):
+            for message in messages:
                 if message.log_time >= _MAX_STAMP_NS:
                     raise McapError(f"log time {message.log_time} ns is out of range")
-            if message.channel_id in by_id:
-                n_missing -= 1
-                topic = by_id[message.channel_id]
-                yield BagMessage(topic.name, topic.type, message.data, message.log_time)
+                if topic := by_id.get(message.channel_id):
+                    n_missing -= 1
+                    yield BagMessage(topic.name, topic.type, message.data, message.log_time)
+            if n_missing > 0:  # mcap skips what it does not know in a chunk
+                raise McapError(f"{n_missing} messages cannot be read")
 
     def _messages_by_time(self, names: Collection[str]) -> Iterator[Message]:
         """Yield at least the messages of some topics by their stamps."""

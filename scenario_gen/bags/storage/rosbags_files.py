@@ -66,20 +66,15 @@ class RosbagsFile:
         ids = {topic.id for topic in topics}
         chosen = [connection for connection in self._reader.connections if connection.id in ids]
         converters = {connection.id: self._converter(connection) for connection in chosen}
-        rows = self._reader.messages(chosen)
-        while True:
-            with guarded(f"{self._path}: damaged", remedy=_REMEDIES.get(self._path.suffix, "")):
-                row = next(rows, None)
-            if row is None:
-                return
-            connection, stamp_ns, data = row
-            if not isinstance(stamp_ns, int) or not isinstance(data, bytes):  # SQLite stores any
-                raise InputError(
-                    f"{self._path}: damaged, a message has timestamp {shown(stamp_ns)} and data "
-                    f"{shown(data, 40)}"
-                )
-            data = converters[connection.id](data)
-            yield BagMessage(connection.topic, connection.msgtype, data, stamp_ns)
+        with guarded(f"{self._path}: damaged", remedy=_REMEDIES.get(self._path.suffix, "")):
+            for connection, stamp_ns, data in self._reader.messages(chosen):
+                if not isinstance(stamp_ns, int) or not isinstance(data, bytes):  # SQLite has any
+                    raise InputError(
+                        f"{self._path}: damaged, a message has timestamp {shown(stamp_ns)} and "
+                        f"data {shown(data, 40)}"
+                    )
+                converted = converters[connection.id](data)
+                yield BagMessage(connection.topic, connection.msgtype, converted, stamp_ns)
 
     def _converter(self, connection: Any) -> Callable[[bytes], bytes]:
         """Return a function that converts the messages of a topic to CDR."""

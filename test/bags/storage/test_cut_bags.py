@@ -77,6 +77,21 @@ def test_a_damaged_chunk_of_a_whole_bag_is_named_after_those_before_it(bag):
         assert read == [data for *_, data in messages[:before]]
 
 
+def test_what_lies_after_a_footer_or_belongs_to_no_topic_is_named(bag):
+    """As in a file whose records were put in another order."""
+    whole, messages = bag.read_bytes(), told(bag)
+    start = 17 + int.from_bytes(whole[9:17], "little")  # of the first chunk, after the header
+    (first, count), (second, _), *_ = chunk_ends(whole)
+    footer = whole[-len(MAGIC) - 29 : -len(MAGIC)]
+    bag.write_bytes(whole[:first] + footer + whole[first:])
+    assert told(bag) == messages[:count]
+    rest = len(whole) - first - len(MAGIC)
+    assert f"{rest} bytes follow the footer" in bag_warnings(bag)[0]
+    bag.write_bytes(whole[:start] + whole[first:second] + footer + MAGIC)
+    with pytest.raises(InputError, match=r"damaged, the topic of \d+ messages is missing"):
+        told(bag)
+
+
 def loose(path):
     """A file without chunks, whose messages are not in order; return its bytes."""
     stream = BytesIO()
