@@ -18,6 +18,9 @@ alternate. A search with a larger budget begins with the drives of a smaller one
   was expected of each before it was drawn. So it is unbiased whatever the quality of the
   regression. The drives of a batch are in random order: a batch that the budget cuts short counts
   with the share that was driven.
+
+Where the first moves of an exploration do not lead nearer to failure, nothing foretells it: the
+run is cut, hardly anything is explored, and every natural scenario is driven (plain sampling).
 """
 
 from collections.abc import Collection, Sequence
@@ -119,6 +122,7 @@ class Search:
     _drawn: int = 0  # natural candidates
     _certified: int = 0  # of these
     _explored: int = 0  # drives of the exploration
+    _traced: bool = True  # the last exploration led nearer to failure
     # The last regression, and the number of drives that it was fitted to.
     _regression: "tuple[int, _Predictor] | None" = None
 
@@ -134,7 +138,8 @@ class Search:
 
     def _explores(self) -> bool:
         """Return whether the next step is an exploration."""
-        return self.worst or self._explored <= SETTINGS.explored_share * len(self.z)
+        share = SETTINGS.explored_share if self._traced else SETTINGS.untraced_share
+        return self.worst or self._explored <= share * len(self.z)
 
     def _generator(self, *key: int) -> np.random.Generator:
         return np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, 7, *key])))
@@ -199,6 +204,7 @@ class Search:
         last = len(self.z) - len(population) + allowed  # number of drives at which it is cut
         seed_count = len(population) // SETTINGS.members_per_seed
         step = SETTINGS.first_step
+        self._traced = True
         for _ in range(SETTINGS.max_levels):
             order = sorted(population, key=lambda k: (self._distance(k, target), k))
             seeds = order[:seed_count]
@@ -206,8 +212,13 @@ class Search:
             if threshold >= self._distance(order[-1], target):
                 break
             goal = threshold if self.worst else max(threshold, 0.0)
-            population, step = self._chains(generator, seeds, (target, goal), step)
-            if (threshold <= 0.0 or len(self.z) >= last) and not self.worst:
+            population, share = self._chains(generator, seeds, (target, goal), step)
+            step *= math.exp(share - SETTINGS.accepted_share)
+            step = min(max(step, 0.05), 1.0)
+            if self.worst:
+                continue
+            self._traced = goal <= 0.0 or share >= SETTINGS.traced_share
+            if threshold <= 0.0 or len(self.z) >= last or not self._traced:
                 break
 
     def _distance(self, k: int, target: int) -> float:
@@ -235,7 +246,7 @@ class Search:
         goal: tuple[int, float],
         step: float,
     ) -> tuple[list[int], float]:
-        """Return the population of the next level, and the next step.
+        """Return the population of the next level, and the accepted share of the moves.
 
         Each seed starts a chain that stays below a threshold of a target, the goal.
         """
@@ -252,9 +263,7 @@ class Search:
                     accepted += 1
             self._check_budget()
             population += heads
-        share = accepted / (len(seeds) * rounds)
-        adapted = step * float(np.exp(share - SETTINGS.accepted_share))
-        return population, min(max(adapted, 0.05), 1.0)
+        return population, accepted / (len(seeds) * rounds)
 
     def _best_moves(
         self, generator: np.random.Generator, heads: list[int], target: int, step: float
@@ -333,10 +342,13 @@ class Search:
     def _design(self) -> tuple[float, float]:
         """Return the least probability of the next batch, and the factor on nearness.
 
-        Until a drive fails, most drives are chosen evenly, since they alone bound the rate.
+        Where nothing foretells failure, every scenario is driven. Until a drive fails, most are
+        chosen evenly, since they alone bound the rate.
         Afterwards the least probability is that of Neyman's allocation: the root of the ratio of
         unexpected failures per even drive to expected ones per drive near to failure.
         """
+        if not self._traced:
+            return 1.0, 1.0
         low, high = SETTINGS.min_even_probability, SETTINGS.max_even_probability
         if not self._failure_count(range(len(self.z))):
             ratio = (1.0 - SETTINGS.even_share) / SETTINGS.even_share

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import optimize, special
 
 from scenario_gen.closed_loop.search.settings import SETTINGS
+from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Interval
 
@@ -34,7 +35,8 @@ def rate_of(batches: Sequence[Batch], weights: Floats, places: Sequence[int]) ->
 
     Its interval is the gamma interval of a sum of weights (Fay & Feuer 1997). The upper end allows
     for one more hit, which has at least the weight of `extra_even_ratio` evenly chosen drives, or
-    `extra_rate_ratio` of the rate if that is less.
+    a share of the rate if that is less: `extra_rate_ratio`, and more with few hits. Where every
+    scenario was driven it is Wilson's.
 
     Args:
         batches: all batches.
@@ -42,10 +44,13 @@ def rate_of(batches: Sequence[Batch], weights: Floats, places: Sequence[int]) ->
         places: index of the batch of each hit.
     """
     scenarios, least, expected = np.array(batches).T
+    if least.min() == 1.0:
+        return wilson(len(weights), round(scenarios.sum()), SETTINGS.confidence)
     parts = weights * (expected / scenarios)[list(places)] / expected.sum()
     rate = float(parts.sum())
     even = float(scenarios @ least)
-    extra = min(SETTINGS.extra_even_ratio / even, SETTINGS.extra_rate_ratio * rate)
+    share = SETTINGS.extra_rate_ratio + SETTINGS.few_hits_ratio / len(weights) ** 2
+    extra = min(SETTINGS.extra_even_ratio / even, share * rate)
     largest = max(float(parts.max()), extra)
     variance = float(parts @ parts)
     half_confidence = 0.5 * SETTINGS.confidence

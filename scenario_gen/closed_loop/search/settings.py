@@ -23,6 +23,9 @@ class SearchSettings:
             when they have used `explored_share` of all drives.
         first_step: standard deviation of the noise of the first moves, in that of a candidate.
         accepted_share: of the moves, to which the step is adapted.
+        traced_share: of the moves that must stay as near to failure as the level before; fewer say
+            that nothing foretells failure.
+        untraced_share: share of the drives that explore then; all others are natural.
         batch: natural candidates that are drawn at once.
         refit_ratio: growth of the number of drives that asks for a new regression.
         even_share: share of the drives of a batch that are chosen evenly, until a drive fails.
@@ -34,10 +37,12 @@ class SearchSettings:
         frequent_ratio: if failures are more frequent than `max_even_probability`, this multiple of
             their rate is driven: they need no choice.
         extra_even_ratio: weight of the hit that the upper end of an interval allows for, over that
-            of an evenly chosen drive. With 0, 90 % of the intervals of 300 drives hold the rate of
-            a planner that fails in two opposite regions; with 0.4, 95 %.
+            of an evenly chosen drive.
         extra_rate_ratio: bound of that weight over the rate: rare failures that are all foreseen
             keep narrow intervals.
+        few_hits_ratio: over the square of the number of hits it is added to that bound. With 0,
+            92 % of the intervals of 300 drives hold the rate of a planner that fails in two
+            opposite regions; with 3, 96 %.
         error_factor: on the error of the regression; a larger one means more drives and smaller
             weights.
     """
@@ -53,6 +58,8 @@ class SearchSettings:
     first_explored: int = 110
     first_step: float = 0.5
     accepted_share: float = 0.4
+    traced_share: float = 0.25
+    untraced_share: float = 0.05
     batch: int = 256
     refit_ratio: float = 1.1
     even_share: float = 0.95
@@ -63,6 +70,7 @@ class SearchSettings:
     frequent_ratio: float = 1.5
     extra_even_ratio: float = 0.4
     extra_rate_ratio: float = 0.7
+    few_hits_ratio: float = 3.0
     error_factor: float = 3.0
 
 
