@@ -9,6 +9,7 @@ from scenario_gen.base.errors import (
     RefusedError as RefusedError,
     ScenarioGenError as ScenarioGenError,
 )
+from scenario_gen.closed_loop.command import drive as drive
 from scenario_gen.closed_loop.environment import DriveEnv as DriveEnv
 from scenario_gen.closed_loop.planners import IdmFollower as IdmFollower
 from scenario_gen.closed_loop.trials import (

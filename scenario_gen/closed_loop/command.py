@@ -21,7 +21,15 @@ from scenario_gen.closed_loop.origin import origins_of
 from scenario_gen.closed_loop.results import DRIVEN, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite, write_selection
-from scenario_gen.closed_loop.trials import Outcome, run_trials, with_origins
+from scenario_gen.closed_loop.trials import (
+    MakePlanner,
+    Outcome,
+    read_trials,
+    run_trials,
+    trials_of,
+    with_origins,
+)
+from scenario_gen.types import GenerationResult
 
 Progress = Callable[[int, int], None]  # numbers of finished and of all drives
 RunTrials = Callable[..., list[Outcome]]  # arguments as of `run_trials`
@@ -77,6 +85,39 @@ class DriveRequest:
             for text in self.assignments
         )
         return reduce(assigned, named, DriveCommandConfig())
+
+
+def drive(
+    scenarios: GenerationResult | Path | str,
+    planner: MakePlanner | str,
+    ego: str = "",
+    config: ClosedLoopConfig = ClosedLoopConfig(),
+    workers: int = 1,
+) -> Drives:
+    """Drive a planner through scenarios in the place of a vehicle.
+
+    Args:
+        scenarios: a result of `generate`, or the path of a bag.
+        planner: its class or its name as MODULE:CLASS, built-in ones without MODULE. Every drive
+            has a new planner.
+        ego: id of the vehicle that it replaces; "": that for which the scenarios were made, or
+            the first.
+        config: the parameters.
+        workers: number of processes; for several the planner must be a name or importable.
+
+    Raises:
+        InputError: there is no such planner or vehicle, or the bag cannot be read.
+    """
+    if not (isinstance(planner, str) or callable(planner)):
+        name = type(planner).__name__
+        raise InputError(f"drive: pass the class {name}, not an object; every drive makes its own")
+    if isinstance(scenarios, GenerationResult):
+        trials = trials_of(scenarios, ego)
+    else:
+        trials = read_trials(Path(scenarios), ego)
+    outcomes = with_origins(run_trials(trials, planner, config, workers), trials)
+    name = planner if isinstance(planner, str) else f"{planner.__module__}:{planner.__qualname__}"
+    return Drives(outcomes, name, config, trials)
 
 
 def drive_bags(

@@ -90,6 +90,14 @@ class Drives:
         """The drives, a row each; the values of a decision and of terms are columns."""
         return pd.json_normalize(self.rows)
 
+    def __repr__(self) -> str:
+        name = self.planner.rpartition(":")[2]
+        return f"Drives({name} passes {passed_of(self.outcomes)})"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a copy of `table`."""
+        return self.table.copy()
+
     def by_severity(self) -> list[int]:
         """Return the indices of the outcomes, the worst first."""
         severity = [outcome.verdict.severity for outcome in self.outcomes]

@@ -20,9 +20,10 @@ from typer.testing import CliRunner
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop.command import drive_bags, DriveRequest
+from scenario_gen.closed_loop.command import drive, drive_bags, DriveRequest
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.planners import IdmFollower
 from scenario_gen.closed_loop.results import as_junit, Drives
 from scenario_gen.closed_loop.trials import read_trials
 
@@ -65,6 +66,16 @@ def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
         assert (tmp_path / "out" / "junit.xml").is_file() and (
             tmp_path / "out" / "drives.html"
         ).is_file()
+
+
+def test_the_library_drives_results_and_bags_as_the_command(bag):
+    made = hand_made_run()
+    by_bag, by_result = drive(bag, PLANNER, "1"), drive(made, IdmFollower, "1")
+    assert repr(by_bag) == repr(by_result) and len(by_bag.outcomes) == len(made)
+    changed = by_bag.to_dataframe().compare(by_result.to_dataframe())
+    assert set(changed.columns.get_level_values(0)) <= {"scenario", "encounter"}
+    with pytest.raises(InputError, match="pass the class IdmFollower"):
+        drive(made, IdmFollower(), "1")
 
 
 def test_scenarios_on_one_road_share_it(bag):
