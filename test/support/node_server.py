@@ -97,6 +97,7 @@ def _become(arguments: list[str], folder: str, environment: dict[str, str], log:
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # as run_suite starts the server
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
