@@ -229,6 +229,13 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
             f"ring would be; the largest one ({_RING.max_radius_m:g} m) allows {possible:.1f} m/s"
         )
     directions = find_arms(name, tracks, ring.centre, ring.radius + _RING.near_ring_m)
+    reaching = {end.vehicle for direction in directions for end in direction.ends}
+    moving = {i for i, track in enumerate(tracks) if not track.still}
+    if recorded is None and moving - reaching:
+        raise RefusedError(
+            f"road roundabout: the recorded paths are too short for its ring (radius "
+            f"{ring.radius:.0f} m for {ring.speed:.1f} m/s)"
+        )
     for direction in directions:
         _refuse_parallel_lanes(direction, config)
     plan = _ring_plan(name, config, ring, directions, tracks)
@@ -270,12 +277,14 @@ def _ring_plan(
     arms, _ = _arms_of(name, directions, tracks, turn, config, ring.radius)
     length = max((track.vehicle.length for track in tracks), default=5.0)
     width = max((track.vehicle.width for track in tracks), default=2.0) + 2.0 * _SWEPT_MARGIN_M
+    trailers = [track.vehicle.trailer for track in tracks if track.vehicle.trailer is not None]
+    trailer = max(trailers, key=lambda each: each.hitch + each.reach, default=None)
     driven = []
     for a, b in product(range(len(arms)), repeat=2):
         start, goal = arms[a].lane(0, config, inward=True), arms[b].lane(0, config, inward=False)
         route = draw_ring_route(start, goal, np.zeros(2), ring.radius)
         if route is not None:
-            driven.append(Driven(Connection(a, 0, b, 0), route, length, width))
+            driven.append(Driven(Connection(a, 0, b, 0), route, length, width, trailer))
     return Plan(arms, driven, ring=ring.radius, yielding=range(len(arms)))
 
 

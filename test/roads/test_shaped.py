@@ -3,6 +3,8 @@
 
 """Roads shaped to a template: what it needs is there, what it cannot use is refused, and the fit keeps the manoeuvres."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.textbook_motions import labelled
@@ -15,7 +17,7 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, RuleKind, Vehicle
+from scenario_gen.types import Encounter, RuleKind, Trailer, Vehicle
 from scenario_gen.types.fit import Segmentation
 
 T = 140
@@ -137,6 +139,10 @@ def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
             assert abs(vehicle.turned[1]) < np.radians(25.0)
     with pytest.raises(RefusedError, match=r"drive up to 18\.0 m/s"):
         build_road("roundabout", made(motion(line(0.0), 18.0, 20.0), motion(line(0.0), 18.0)))
+    with pytest.raises(
+        RefusedError, match=r"too short for its ring \(radius 40 m for 11\.0 m/s\)"
+    ):
+        build_road("roundabout", made(motion(line(0.0), 3.0, 20.0), motion(line(0.0), 11.0)))
 
 
 @pytest.mark.parametrize(("radius", "circles"), [(16.0, False), (10.0, False), (16.0, True)])
@@ -171,6 +177,11 @@ def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_dri
     assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {
         loss.kind for loss in fit.losses
     } <= {"arm"}
+    if not circles:  # it is wide enough for a trailer, too
+        encounter = made(*zip(poses, speeds, strict=True))
+        truck = Vehicle("0", 7.0, 2.5, "truck", Trailer("t", 10.0, 2.5, 3.2, 4.5))
+        towing = replace(encounter, vehicles=(truck, encounter.vehicles[1]))
+        assert len(generate(towing, "roundabout", count=1, seed=1)) == 1
 
 
 def test_roads_without_a_template_are_of_their_kind():
