@@ -37,7 +37,7 @@ LOSABLE = {
     "order": "another vehicle goes first",
     "following": "a vehicle does not follow its leader",
     "merge": "a vehicle does not enter another one's lane",
-    "lane_change": "a vehicle does not leave another one's lane, or two lanes become one",
+    "lane_change": "a vehicle does not leave another one's lane",
     "overtaking": "a vehicle does not pass another one",
     "clearance": "two vehicles side by side in one lane are nearer to each other",
     "stand": "a vehicle does not pass a stationary one on the same side",
@@ -180,10 +180,11 @@ def _lane_loss(a: str, b: str, offsets: Sequence[float]) -> Loss:
     if in_lane[-1]:
         message = f"vehicle {b} enters the lane of {a} in the recording, not on this road"
         return Loss("merge", (a, b), message)
-    message = f"vehicles {a} and {b} drive in two lanes in the recording, otherwise on this road"
     if in_lane[0]:
         message = f"vehicle {b} leaves the lane of {a} in the recording, not on this road"
-    return Loss("lane_change", (a, b), message)
+        return Loss("lane_change", (a, b), message)
+    message = f"vehicles {a} and {b} drive in two lanes in the recording, otherwise on this road"
+    return Loss("lanes", (a, b), message)
 
 
 def _changes_lane(recorded: float, on_road: float, max_offset: float) -> bool:

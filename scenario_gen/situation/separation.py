@@ -202,7 +202,9 @@ def _shifted(track: Track, shift: Floats) -> Track:
     curve, progress = track.curve, track.progress
     if abs(shift[0]) > 0.0:
         step = 1.0 if track.still else 0.5
-        curve = curve.cut(shift[0], shift[0] + max(curve.length, step), step)
+        lane = track.lane or curve
+        start = float(lane.project(curve.points[:1, :2])[0][0]) + shift[0]
+        curve = lane.cut(start, start + max(curve.length, step), step)
     if abs(shift[1]) > 0.0:
         parallel = Curve(curve.at_offset(curve.station, shift[1]))
         progress = np.interp(progress, curve.station, parallel.station)

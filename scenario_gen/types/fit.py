@@ -70,7 +70,7 @@ class Loss:
 
     Attributes:
         kind: "turn", "conflict" (paths that cross or merge), "following", "new conflict", "order",
-            "beside" or "arm" (an arm of the road that nobody uses).
+            "beside", "lanes" (two become one) or "arm" (nobody uses an arm of the road).
         vehicles: ids of whom it concerns.
         message: a sentence, with figures.
     """

@@ -150,7 +150,8 @@ class Candidate:
     @property
     def score(self) -> tuple[float, ...]:
         """Order of candidates: losses, uncomfortable bends, `rank`."""
-        return len(self.refused_losses), not self.is_comfortable, *self.rank
+        lost = len(self.refused_losses), not self.is_comfortable, len(self.shared_lanes)
+        return *lost, *self.rank
 
     @property
     def scale(self) -> float:
@@ -160,7 +161,13 @@ class Candidate:
     @property
     def is_good(self) -> bool:
         """Whether it loses nothing, and its bends can be driven at the recorded end speeds."""
-        return self.is_comfortable and not self.surely_lost and not self.refused_losses
+        good = self.is_comfortable and not self.surely_lost and not self.refused_losses
+        return good and not self.shared_lanes
+
+    @property
+    def shared_lanes(self) -> list[Loss]:
+        """The vehicles in one lane that were recorded in two."""
+        return [loss for loss in self.losses if loss.kind == "lanes"]
 
     @property
     def depends_on_scale(self) -> bool:

@@ -231,6 +231,9 @@ def best_place(
         except RefusedError as error:
             reason = reason or str(error)
             continue
+        if repair > _MAX_REPAIR_M and candidate.shared_lanes:
+            reason = reason or f"{candidate.shared_lanes[0].message}, with too little room"
+            continue
         rank = len(candidate.refused_losses) + 0.5 * (repair > _MAX_REPAIR_M)
         if rank < lowest:
             lowest, best = rank, candidate

@@ -72,6 +72,10 @@ def test_lanes_that_are_too_narrow_or_too_few_are_named(tmp_path) -> None:
         generate(lane_encounter(speed, speed), narrow, count=1)
     passing = lane_encounter(speed, speed + 4.0, gap=10.0, lane=3.5)
     with pytest.raises(
-        RefusedError, match=r"drive in two lanes in the recording, otherwise .* Shortened"
+        RefusedError, match=r"passes 1 on its left in the recording, not on .* Shortened"
     ):
         generate(passing, write(tmp_path, ".xodr"), count=1)
+    result = generate(
+        lane_encounter(speed, speed, gap=10.0, lane=3.5), write(tmp_path, ".xodr"), count=1
+    )
+    assert {loss.kind for loss in result.fit.losses} >= {"lanes"}
