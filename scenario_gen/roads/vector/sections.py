@@ -269,13 +269,18 @@ def _lanes_of_side(
             reason = f"{lane.place}: a second lane {name}, or one nearer to the centre is missing"
             faults.add("lane", f"{road.id}.{number}.{name} and those beyond it", reason)
             return
-        if widths := lane.findall("width"):
+        widths, borders = lane.findall("width"), lane.findall("border")
+        if widths:
             offset = offset + sign * np.maximum(stations.values(widths), 0.0)
-        elif borders := lane.findall("border"):
+        elif borders:
             offset = stations.values(borders) + stations.centre
         outer = stations.poses[:, :2] + offset[:, None] * normal
         forward = ((name < 0) != road.left_hand) != (lane.get("direction") == "reversed")
-        yield name, SectionLane((road.id, number, name), lane, stations.s, inner, outer, forward)
+        key = road.id, number, name
+        drawn = SectionLane(key, lane, stations.s, inner, outer, forward)
+        if drawn.users and not widths and not borders:
+            faults.add("lane", drawn.name, f"{lane.place}: it has neither width nor border")
+        yield name, drawn
         inner = outer
 
 

@@ -63,6 +63,11 @@ def test_a_lane_beyond_a_missing_one_costs_only_itself(tmp_path) -> None:
     assert len(road.lanes.lanes) == len(whole.lanes.lanes)
     (note,) = [note for note in road.lanes.notes if note.kind is NoteKind.FAULTY]
     assert "0.0.-3 and those beyond it" in str(note)
+    text = opendrive().replace("</right>", '<lane id="-2" type="driving"/></right>', 1)
+    road = build_road(str(write(tmp_path, ".xodr", text)))
+    assert len(road.lanes.lanes) == len(whole.lanes.lanes)
+    (note,) = [note for note in road.lanes.notes if note.kind is NoteKind.FAULTY]
+    assert "it has neither width nor border" in str(note)
 
 
 def test_lanes_that_are_too_narrow_or_too_few_are_named(tmp_path) -> None:
