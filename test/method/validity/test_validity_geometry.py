@@ -111,6 +111,24 @@ def test_a_post_of_one_cell_between_two_samples_is_seen(resolution):
     assert causes(drive, road_of(drivable, resolution)) == []
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.5 * np.pi, 1.0])
+@pytest.mark.parametrize("ahead", [0.0, 1.0])
+def test_a_slide_in_any_direction_is_swept(yaw, ahead):
+    """Limits aside the proof holds for any motion: 20 m aside, or ahead, between two samples at no speed."""
+    turned = yaw + 0.5 * np.pi * (1.0 - ahead)
+    way = np.array([np.cos(turned), np.sin(turned)])
+    middle, time = np.array([25.1, 25.1]), np.array([0.0, 1.0])
+    slide = np.array([middle - 10.0 * way, middle + 10.0 * way]), np.full(2, yaw), np.zeros(2)
+    scenario = scenario_of([slide], time, (Vehicle("a", 4.0, 2.0),))
+    cells = np.ones((200, 200), dtype=bool)
+    assert causes(scenario, road_of(cells, 0.25)) == []
+    for post in (-6.0, 6.0):
+        column, row = ((middle + post * way) / 0.25).astype(int)
+        blocked = cells.copy()
+        blocked[row, column] = False
+        assert causes(scenario, road_of(blocked, 0.25)) == [Cause.OFF_ROAD]
+
+
 def test_a_lane_as_wide_as_the_car_suffices_and_a_hair_less_does_not():
     road = road_of(np.pad(np.ones((8, 400), dtype=bool), 2), 0.25)
     fits = scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),))
