@@ -135,7 +135,7 @@ class RrtStarConnect:
         search = self.search(space, query, label, seed)
         for improved in search.rounds(budget, MAX_ROUND_ITERATIONS):
             if improved:
-                if search.path is None:
+                if search.path is None and not budget.first:
                     corners = _corner_poses(space, label)
                     search.rules = search.rules._replace(near=corners)
                 path = straight_path(search)

@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,12 @@ from scenario_gen.method.arguments import (
     Templates,
     whole_number,
 )
-from scenario_gen.method.chain import plan_set, Planned
+from scenario_gen.method.chain import Generation
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, EvaluationConfig, replay
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
 from scenario_gen.method.sampling import Callbacks, Progress
-from scenario_gen.method.shortening import fit_what_matters
-from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
+from scenario_gen.method.suitable_roads import AUTO
 from scenario_gen.numerics.blas import one_blas_thread
 from scenario_gen.types import (
     Coverage,
@@ -85,33 +84,27 @@ def generate(
     config, request, progress = config_of(config), request_of(request), progress_of(progress)
     count, seed = whole_number("count", count, 1), seed_of(seed)
     encounter, *population = encounters_of(encounter, config)
-    swapped = swapped_order(encounter, config.sampling) if request.order == "swap" else None
-    if swapped is not None:
-        encounter, request = swapped, replace(request, order="keep")
+    generation = Generation(road, config, request, seed, population, Callbacks(progress), accepts)
+    return _set_of(generation, encounter, count)
 
-    plan = partial(plan_set, config=config, seed=seed, request=request, population=population)
-    # The last template that fits the road is planned once.
-    planned = lru_cache(maxsize=1)(lambda template: plan(template, road))
 
-    def sampled(template: Planned, size: int) -> GenerationResult:
-        """Return the scenarios of a planned template."""
-        callbacks = Callbacks(progress, accepts=partial(accepts, template.chain.road))
-        return template.sample(size, callbacks)
-
-    def generate_template(template: Encounter, size: int) -> GenerationResult:
-        """Generate scenarios from the encounter, or from a part of it."""
-        if road != AUTO:
-            return sampled(planned(template), size)
-        return on_first_suitable_road(
-            lambda name: sampled(plan(template, name), size), template, config, seed
-        )
-
-    attempt = None if road == AUTO else planned
-    shorten = config.fitting.shorten and not request.moves
-    fitting = replace(config.fitting, shorten=shorten)
+def _set_of(generation: Generation, encounter: Encounter, count: int) -> GenerationResult:
+    """Return the scenarios of an encounter, or of one that swaps its order if that is asked."""
+    if generation.request.order == "swap":
+        swapped = swapped_order(encounter, generation.config.sampling)
+        if swapped is not None:
+            request = replace(generation.request, order="keep")
+            generation, encounter = replace(generation, request=request), swapped
     with one_blas_thread():
-        result = fit_what_matters(generate_template, encounter, count, fitting, attempt=attempt)
-        return completed(result, config, request)
+        result = generation.run(encounter, count)
+        return completed(result, generation.config, generation.request)
+
+
+def _outcome_of(generation: Generation, encounter: Encounter, count: int) -> GenerationResult:
+    """Return the scenarios of one outcome of an encounter."""
+    sampling = for_one_set(generation.config.sampling, encounter)
+    config = replace(generation.config, sampling=sampling)
+    return _set_of(replace(generation, config=config), encounter, count)
 
 
 def completed(
@@ -120,10 +113,10 @@ def completed(
     request: Request,
 ) -> GenerationResult:
     """Return a set of scenarios with its replay and provenance; it is evaluated when read."""
-    encounter, (road, fit) = result.encounter, result.road_and_fit()
-    result = replace(result, replay=replay(encounter, fit, road.frame_id))
+    road, fit = result.road_and_fit()
     return replace(
         result,
+        replay=replay(result.encounter, fit, road.frame_id),
         figures=partial(_evaluated, config=config.evaluation),
         covered=_coverage,
         provenance=what_makes_it_again(config, request),
@@ -175,19 +168,10 @@ def generate_outcomes(
         >>> sum(map(len, sg.generate_outcomes(encounter, "four_way", config)))
         50
     """
-    config, request, seed = config_of(config), request_of(request), seed_of(seed)
+    config, request, progress = config_of(config), request_of(request), progress_of(progress)
+    count, seed = whole_number("count", count, 1), seed_of(seed)
     encounter, *population = encounters_of(encounter, config)
 
-    def generate_set(template: Encounter, size: int) -> GenerationResult:
-        """Generate the scenarios of one outcome."""
-        return generate(
-            [template, *population],
-            road,
-            replace(config, sampling=for_one_set(config.sampling, template)),
-            count=size,
-            seed=seed,
-            request=request,
-            progress=progress,
-        )
-
+    generation = Generation(road, config, request, seed, population, Callbacks(progress))
+    generate_set = partial(_outcome_of, generation)
     return outcome_sets(generate_set, encounter, config.sampling, request, count, seed)

@@ -48,8 +48,8 @@ STAGES = (
     "config",
     "arguments",
     "shortening",
-    "chain",
     "suitable_roads",
+    "chain",
 )
 # Each concept, its one home, and what would show a second one: a regular expression, searched in the whole text of a file.
 CONCEPTS = {

@@ -24,7 +24,7 @@ from scenario_gen.closed_loop.planners import IdmFollower, ReferenceFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, Planner
 from scenario_gen.closed_loop.streams import Stream
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.method.chain import plan_set, Planned
+from scenario_gen.method.chain import Chain, Generation
 from scenario_gen.method.sampling import Callbacks, Progress, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, suitable_roads
@@ -37,6 +37,7 @@ from scenario_gen.types import (
     GenerationResult,
     Note,
     NoteKind,
+    Planned,
     Request,
     Road,
     Scenario,
@@ -163,7 +164,7 @@ class Testing:
         self.notify(f"{selection.kept} of {count} scenarios for testing ({causes})")
         return TestSets(results, shortage)
 
-    def _plans(self, selection: Selection) -> list[Planned]:
+    def _plans(self, selection: Selection) -> list[tuple[Chain, Planned]]:
         """Return the templates, planned; refused ones are counted.
 
         Raises:
@@ -192,17 +193,14 @@ class Testing:
                     parts = segment(template, config.segmentation, self.seed)
                     names = suitable_roads(Situation.of(template), parts, config)
                     road = next(names, AUTO)
-                planned = plan_set(
-                    template, road, config=config, seed=self.seed, request=self.request
-                )
-                plans.append(planned)
+                plans.append(Generation(road, config, self.request, self.seed).plan(template))
             except RefusedError as error:
                 selection.unfit[str(error)] += 1
         return plans
 
     def _drawn(
         self,
-        plan: Planned,
+        plan: tuple[Chain, Planned],
         wanted: int,
         turn: int,
         selection: Selection,
@@ -211,16 +209,15 @@ class Testing:
     ) -> list[GenerationResult]:
         """Return a set of scenarios of a template, or none."""
         config = ClosedLoopConfig(limits=self.config.limits)
+        chain, planned = plan
 
         def accepts(scenario: Scenario) -> bool:
-            return selection.keeps(
-                ClosedLoop(scenario, self.request.ego, plan.result.road, config)
-            )
+            return selection.keeps(ClosedLoop(scenario, self.request.ego, planned.road, config))
 
         def report(_done: int, _total: int, candidates: int) -> None:
             progress(selection.kept, selection.kept + wanted, candidates)
 
-        chain = replace(plan.chain, count=wanted, seed=self.seed + turn)
+        chain = replace(chain, count=wanted, seed=self.seed + turn)
         tries, kept = selection.tries, selection.kept
 
         def cancelled() -> bool:
@@ -229,7 +226,7 @@ class Testing:
 
         callbacks = Callbacks(report, cancelled, accepts)
         try:
-            drawn = chain.sample(replace(plan.result, seed=chain.seed), callbacks)
+            drawn = chain.sample(replace(planned, seed=chain.seed), callbacks)
         except RefusedError as error:
             selection.unfit[str(error)] += 1
             return []

@@ -1,12 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""All stages but the evaluation; those after the segmentation can be repeated with changes."""
+"""From an encounter to scenarios in sequence: prepare, place, plan and draw.
 
-from collections.abc import Sequence
+What does not fit as a whole is shortened, and with the road `AUTO` several roads are tried.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.config import PipelineConfig
@@ -14,23 +18,29 @@ from scenario_gen.method.continuation import driven_on
 from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import Callbacks, Plan, sample_scenarios
+from scenario_gen.method.sampling import Callbacks, Plan, sample_scenarios, TargetError
 from scenario_gen.method.segmentation import segment
+from scenario_gen.method.shortening import fitting_part
+from scenario_gen.method.suitable_roads import AUTO, refuse_lost_conflicts, suitable_roads
 from scenario_gen.roads import road_and_template
-from scenario_gen.situation import Situation, Wait
+from scenario_gen.situation import refuse_reversing, refuse_too_large, Situation, Wait
 from scenario_gen.types import (
     causes_in_words,
     Encounter,
     GenerationResult,
+    Note,
+    NoteKind,
+    Planned,
     Request,
     Road,
+    Scenario,
     Segmentation,
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """The input of the stages after the segmentation.
+    """A template that is prepared for a road: the input of all later stages.
 
     Attributes:
         situation: the template's.
@@ -42,6 +52,7 @@ class Chain:
         seed: of all randomness.
         waits: that scenarios keep; the template's if None.
         population: recorded encounters that show how encounters differ.
+        notes: on the preparation of the template.
     """
 
     situation: Situation
@@ -53,14 +64,15 @@ class Chain:
     seed: int = 0
     waits: tuple[Wait, ...] | None = None
     population: Sequence[Encounter] = ()
+    notes: Sequence[Note] = ()
 
     @property
     def encounter(self) -> Encounter:
         """The template."""
         return self.situation.encounter
 
-    def plan(self) -> GenerationResult:
-        """Fit and plan; the result has no scenarios yet.
+    def plan(self) -> Planned:
+        """Place the template on the road and plan its routes.
 
         Raises:
             InputError, RefusedError: as the stages.
@@ -75,14 +87,11 @@ class Chain:
             limits=limits,
         )
         routes = plan_routes(self.road, fit, config.planning, self.seed, limits)
-        return GenerationResult(
-            self.encounter, self.segmentation, self.road, fit, routes, seed=self.seed
-        )
+        fit = replace(fit, notes=(*self.notes, *fit.notes))
+        return Planned(self.encounter, self.segmentation, self.road, fit, routes, self.seed)
 
-    def sample(
-        self, planned: GenerationResult, callbacks: Callbacks = Callbacks()
-    ) -> GenerationResult:
-        """Add scenarios to a planned template.
+    def sample(self, planned: Planned, callbacks: Callbacks = Callbacks()) -> GenerationResult:
+        """Draw scenarios of a planned template.
 
         Raises:
             InputError, RefusedError: as `sample_scenarios`.
@@ -98,7 +107,7 @@ class Chain:
         )
 
     def run(self, callbacks: Callbacks = Callbacks()) -> GenerationResult:
-        """Fit, plan and sample.
+        """Place, plan and sample.
 
         Raises:
             InputError, RefusedError: as the stages.
@@ -114,25 +123,109 @@ class EmptySetError(RefusedError):
         self.result = result
 
 
-class Planned(NamedTuple):
-    """A template that is fitted and planned on a road.
+@dataclass(frozen=True, eq=False)
+class Generation:
+    """How scenarios of a template are made, on one road or on the first suitable one.
 
     Attributes:
-        chain: the input of the stages.
-        result: the template on the road, without scenarios.
+        road: the target; `AUTO`: the first built-in road that is suitable.
+        config: the parameters of every stage.
+        request: what is requested.
+        seed: of all randomness.
+        population: recorded encounters that show how encounters differ.
+        callbacks: of the sampler.
+        accepts: takes the road and a valid scenario; one that it refuses is left out.
     """
 
-    chain: Chain
-    result: GenerationResult
+    road: Road | Path | str
+    config: PipelineConfig
+    request: Request
+    seed: int
+    population: Sequence[Encounter] = ()
+    callbacks: Callbacks = Callbacks()
+    accepts: Callable[[Road, Scenario], bool] = lambda *_: True
 
-    def sample(self, count: int, callbacks: Callbacks = Callbacks()) -> GenerationResult:
-        """Add scenarios.
+    def run(self, encounter: Encounter, count: int) -> GenerationResult:
+        """Return scenarios of an encounter, or of its part that fits with the smallest loss.
 
         Raises:
-            InputError, RefusedError: as `sample_scenarios`.
+            RefusedError: as the stages, for the whole encounter; the message has the lanes that
+                its shortest form needs.
+            InputError, TargetError: as the stages.
+        """
+        refuse_too_large(encounter)
+        try:
+            return self.of_whole(encounter, count)
+        except RefusedError as error:
+            fitting = self.config.fitting
+            if not fitting.shorten or self.request.moves or isinstance(error, TargetError):
+                raise
+            refusal = error
+        if self.road != AUTO:  # most parts that do not fit can be told from their plans
+            _, planned, note = fitting_part(self.plan, encounter, refusal, fitting)
+            with suppress(RefusedError):
+                return self.draw(*planned, count).noted(note)
+        single = partial(self.of_whole, count=1)
+        part, _, note = fitting_part(single, encounter, refusal, fitting)
+        return self.of_whole(part, count).noted(note)
+
+    def of_whole(self, encounter: Encounter, count: int) -> GenerationResult:
+        """Return scenarios of an encounter as it is.
+
+        Raises:
+            InputError, RefusedError: as the stages.
+        """
+        if self.road != AUTO:
+            return self.draw(*self.plan(encounter), count)
+        refuse_too_large(encounter)
+        refuse_reversing(encounter)
+        refusal = RefusedError(
+            f"{encounter.name} does not fit any built-in road; give the path of a map"
+        )
+        segmentation = segment(encounter, self.config.segmentation, self.seed)
+        for name in suitable_roads(Situation.of(encounter), segmentation, self.config):
+            try:
+                result = replace(self, road=name).of_whole(encounter, count)
+                refuse_lost_conflicts(result)
+            except RefusedError as error:
+                kind = TargetError if isinstance(error, TargetError) else RefusedError
+                refusal = kind(f"{encounter.name} on road {name}, the last one tried: {error}")
+            else:
+                return result.noted(Note.of(NoteKind.AUTO_ROAD, road=name))
+        raise refusal
+
+    def plan(self, encounter: Encounter) -> tuple[Chain, Planned]:
+        """Prepare, place and plan an encounter on the road.
+
+        It is driven on where a record ends in the way of another vehicle, mirrored on a map with
+        the other side of traffic, and segmented.
+
+        Raises:
+            InputError, RefusedError: as the stages.
+        """
+        encounter, notes = driven_on(encounter)
+        road, encounter = road_and_template(self.road, encounter, self.config.road)
+        chain = Chain(
+            Situation.of(encounter),
+            segment(encounter, self.config.segmentation, self.seed),
+            road,
+            self.config,
+            self.request,
+            seed=self.seed,
+            population=self.population,
+            notes=notes,
+        )
+        return chain, chain.plan()
+
+    def draw(self, chain: Chain, planned: Planned, count: int) -> GenerationResult:
+        """Return scenarios of a planned encounter, at least one.
+
+        Raises:
+            InputError, RefusedError: as `Chain.sample`.
             EmptySetError: there is none; the message has the causes of all refusals and the notes.
         """
-        result = replace(self.chain, count=count).sample(self.result, callbacks)
+        callbacks = replace(self.callbacks, accepts=partial(self.accepts, planned.road))
+        result = replace(chain, count=count).sample(planned, callbacks)
         if not len(result):
             generated = result.generated
             refused = causes_in_words(generated.refused)
@@ -141,27 +234,3 @@ class Planned(NamedTuple):
             message = f"none of {generated.candidates} candidates is valid: {reasons}"
             raise EmptySetError(message, result)
         return result
-
-
-def plan_set(
-    encounter: Encounter,
-    road: Road | Path | str,
-    *,
-    config: PipelineConfig,
-    seed: int,
-    request: Request = Request(),
-    population: Sequence[Encounter] = (),
-) -> Planned:
-    """Return a template that is fitted and planned on a road.
-
-    Raises:
-        InputError, RefusedError: as the stages.
-    """
-    encounter, notes = driven_on(encounter)
-    road, encounter = road_and_template(road, encounter, config.road)
-    segmentation = segment(encounter, config.segmentation, seed)
-    situation = Situation.of(encounter)
-    chain = Chain(situation, segmentation, road, config, request, seed=seed, population=population)
-    planned = chain.plan()
-    _, fit = planned.road_and_fit()
-    return Planned(chain, replace(planned, fit=replace(fit, notes=(*notes, *fit.notes))))

@@ -11,75 +11,36 @@ What the road has room for is then given back, in quarters.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.sampling import TargetError
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import (
     describe_turn,
     interaction_windows,
     keeps_interaction,
     MIN_LOSS_S,
-    refuse_too_large,
     Situation,
     turn_of,
 )
-from scenario_gen.types import Encounter, GenerationResult, Note, NoteKind, YIELD
+from scenario_gen.types import Encounter, Note, NoteKind, YIELD
 
-GenerateSet = Callable[[Encounter, int], GenerationResult]
-
-
-def fit_what_matters(
-    generate: GenerateSet,
-    encounter: Encounter,
-    count: int,
-    config: FittingConfig = FittingConfig(),
-    *,
-    attempt: Callable[[Encounter], object] | None = None,
-) -> GenerationResult:
-    """Return the scenarios of a recording, or of a shortened one if the whole does not fit.
-
-    Args:
-        generate: returns so many scenarios from a template.
-        encounter: the recording.
-        count: scenarios.
-        config: whether and how the recording may be shortened.
-        attempt: raises a RefusedError if a recording does not fit. If it is None, or its part has
-            no scenario, a scenario is generated from each part instead.
-
-    Raises:
-        RefusedError: as `generate` for the whole recording; the message has the lanes that its
-            shortest form needs.
-        InputError, TargetError: as `generate`.
-    """
-    refuse_too_large(encounter)
-    try:
-        return generate(encounter, count)
-    except RefusedError as error:
-        if not config.shorten or isinstance(error, TargetError):
-            raise
-        refusal = error
-    if attempt is not None:
-        part, note = fitting_part(attempt, encounter, refusal, config)
-        with suppress(RefusedError):
-            return generate(part, count).noted(note)
-    part, note = fitting_part(lambda part: generate(part, 1), encounter, refusal, config)
-    return generate(part, count).noted(note)
+Made = TypeVar("Made")
 
 
 def fitting_part(
-    attempt: Callable[[Encounter], object],
+    attempt: Callable[[Encounter], Made],
     encounter: Encounter,
     refusal: RefusedError,
     config: FittingConfig = FittingConfig(),
-) -> tuple[Encounter, Note]:
+) -> tuple[Encounter, Made, Note]:
     """Return the part of a recording that fits with the smallest loss, and a note on it.
+
+    Between them is what `attempt` returned for the part.
 
     Args:
         attempt: raises a RefusedError if a recording does not fit.
@@ -96,7 +57,7 @@ def fitting_part(
         search.add_remedy(refusal)
         raise refusal
     parts = in_words(encounter, part) + search.lost_braking(part)
-    return part, Note.of(NoteKind.SHORTENED, parts=parts, reason=str(refusal))
+    return part, search.made[-1], Note.of(NoteKind.SHORTENED, parts=parts, reason=str(refusal))
 
 
 def cut(encounter: Encounter, windows: Floats) -> Encounter:
@@ -127,13 +88,17 @@ class _Way(NamedTuple):
 
 
 @dataclass(eq=False)
-class _Search:
-    """The search for the shortest loss with which a recording fits."""
+class _Search(Generic[Made]):
+    """The search for the shortest loss with which a recording fits.
 
-    attempt: Callable[[Encounter], object]
+    `made` is what the attempts with parts that fit returned; the last one is that of the result.
+    """
+
+    attempt: Callable[[Encounter], Made]
     situation: Situation
     config: FittingConfig
     refusals: list[tuple[Encounter, RefusedError]] = field(default_factory=list)
+    made: list[Made] = field(default_factory=list)
 
     def shortest_loss(self) -> Encounter | None:
         """Return the recording with the smallest loss found; None if it does not fit shortened."""
@@ -239,7 +204,7 @@ class _Search:
         if part is None:
             return None
         try:
-            self.attempt(part)
+            self.made.append(self.attempt(part))
         except RefusedError as error:
             self.refusals.append((part, error))
             return None

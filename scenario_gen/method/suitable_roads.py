@@ -3,7 +3,7 @@
 
 """The built-in roads that fit an encounter: `road="auto"` uses the first, refusals name all."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
@@ -11,7 +11,6 @@ from itertools import islice
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
-from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.shortening import cut
 from scenario_gen.roads import (
@@ -25,7 +24,6 @@ from scenario_gen.roads import (
 from scenario_gen.situation import (
     conflict_of,
     interaction_windows,
-    refuse_reversing,
     refuse_too_large,
     Situation,
 )
@@ -33,8 +31,6 @@ from scenario_gen.types import (
     Encounter,
     GenerationResult,
     join_ego,
-    Note,
-    NoteKind,
     Road,
     Segmentation,
 )
@@ -71,36 +67,6 @@ def suitable_roads(
     return (name for name in names if fits_road(name, situation, segmentation, config))
 
 
-def on_first_suitable_road(
-    generate: Callable[[str], GenerationResult],
-    encounter: Encounter,
-    config: PipelineConfig,
-    seed: int,
-) -> GenerationResult:
-    """Return the result on the first built-in road that fits; the result names it.
-
-    Raises:
-        RefusedError: the encounter is too large, or no road gives a scenario.
-        TargetError: the last road gives none in the requested range.
-    """
-    refuse_too_large(encounter)
-    refuse_reversing(encounter)
-    refusal = RefusedError(
-        f"{encounter.name} does not fit any built-in road; give the path of a map"
-    )
-    segmentation = segment(encounter, config.segmentation, seed)
-    for name in suitable_roads(Situation.of(encounter), segmentation, config):
-        try:
-            result = generate(name)
-            _refuse_lost_conflicts(result)
-        except RefusedError as error:
-            kind = TargetError if isinstance(error, TargetError) else RefusedError
-            refusal = kind(f"{encounter.name} on road {name}, the last one tried: {error}")
-        else:
-            return result.noted(Note.of(NoteKind.AUTO_ROAD, road=name))
-    raise refusal
-
-
 def with_suitable_roads(
     error: RefusedError, encounter: Encounter, road: Road | str, config: PipelineConfig, seed: int
 ) -> RefusedError:
@@ -125,7 +91,7 @@ def with_suitable_roads(
     return error
 
 
-def _refuse_lost_conflicts(result: GenerationResult) -> None:
+def refuse_lost_conflicts(result: GenerationResult) -> None:
     """Refuse a result in which two vehicles do not meet that meet in the recording.
 
     Raises:

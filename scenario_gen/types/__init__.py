@@ -58,7 +58,7 @@ from scenario_gen.types.fit import (
     routes_in_words,
     Segmentation,
 )
-from scenario_gen.types.generation import ERRORS, GenerationResult
+from scenario_gen.types.generation import ERRORS, GenerationResult, Planned
 from scenario_gen.types.lanes import (
     CARS,
     DrawnFor,
@@ -190,6 +190,7 @@ __all__ = [
     "Outcome",
     "Pair",
     "PassingOrder",
+    "Planned",
     "Quality",
     "Reached",
     "Reaction",

@@ -23,7 +23,13 @@ from scenario_gen.types.fit import Fit, Route, Segmentation
 from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import causes_in_words, dataframe, Scenario, ScenarioSet
+from scenario_gen.types.scenario import (
+    BoundaryStates,
+    causes_in_words,
+    dataframe,
+    Scenario,
+    ScenarioSet,
+)
 from scenario_gen.types.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -32,6 +38,46 @@ if TYPE_CHECKING:
 
 ERRORS = {"e_position": "position", "e_speed": "speed", "e_heading": "heading"}
 """The figures of likeness, and what they are of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A template that is placed on a road and planned there.
+
+    Attributes:
+        encounter: the template.
+        segmentation: its primitives.
+        road: the target road.
+        fit: the template on it.
+        routes: one for each vehicle.
+        seed: of the scenarios.
+    """
+
+    encounter: Encounter
+    segmentation: Segmentation
+    road: Road
+    fit: Fit
+    routes: Sequence[Route]
+    seed: int = 0
+
+    @property
+    def title(self) -> str:
+        """Encounter and road, as a heading."""
+        return f"{self.encounter.name} on {self.road.name}"
+
+    def with_scenarios(
+        self, generated: ScenarioSet, requested: BoundaryStates
+    ) -> "GenerationResult":
+        """Return the result with scenarios, and the states that were requested of them."""
+        return GenerationResult(
+            self.encounter,
+            self.segmentation,
+            self.road,
+            replace(self.fit, requested=requested),
+            self.routes,
+            generated,
+            self.seed,
+        )
 
 
 @dataclass(frozen=True, eq=False)

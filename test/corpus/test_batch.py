@@ -20,7 +20,6 @@ from pyarrow import parquet
 import pytest
 from support.source_files import ROOT
 
-from scenario_gen import pipeline
 from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, RefusedError
@@ -32,7 +31,7 @@ from scenario_gen.corpus.find import coverage_lines, export_hits, find
 from scenario_gen.corpus.parts import BatchRequest, LOST_CONFLICT
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
-from scenario_gen.method.chain import plan_set
+from scenario_gen.method.chain import Generation
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
@@ -316,10 +315,10 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
 def test_like_refusals_are_counted_under_one_cause(
     corpus, tmp_path, monkeypatch, kind, why, failures
 ):
-    def refuse(_encounter, road, **_):
-        raise kind(f"road {road} {why}")
+    def refuse(generation, _):
+        raise kind(f"road {generation.road} {why}")
 
-    monkeypatch.setattr(pipeline, "plan_set", refuse)
+    monkeypatch.setattr(Generation, "plan", refuse)
     made = run_batch(
         corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1)
     )
@@ -332,12 +331,14 @@ def test_a_recording_that_is_too_long_for_a_road_is_shortened(corpus, tmp_path, 
     row = next(rows_of(tables_of(corpus[0])))
     limit = 0.95 * encounter_of(row).duration
 
-    def short_road(encounter, *arguments, **others):
+    plan = Generation.plan
+
+    def short_road(generation, encounter):
         if encounter.duration > limit:
             raise RefusedError("the road is too short")
-        return plan_set(encounter, *arguments, **others)
+        return plan(generation, encounter)
 
-    monkeypatch.setattr(pipeline, "plan_set", short_road)
+    monkeypatch.setattr(Generation, "plan", short_road)
     out, workers = tmp_path / "out", Workers(1)
     made = run_batch(corpus[0], ["corridor"], out, REQUEST, templates=1, workers=workers)
     (case,) = rows_of(sorted((out / "cases").rglob("*.parquet")))

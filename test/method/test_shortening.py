@@ -3,6 +3,7 @@
 
 """A recording that is too long for a road is shortened to its interaction."""
 
+from dataclasses import dataclass, field
 from pathlib import Path
 import pickle
 
@@ -10,15 +11,17 @@ import numpy as np
 import pytest
 
 from scenario_gen import read_log
-from scenario_gen.method.chain import EmptySetError
-from scenario_gen.method.shortening import cut, fit_what_matters
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.chain import EmptySetError, Generation
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.shortening import cut, fitting_part
 from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation import (
     interaction_windows,
     keeps_interaction,
     Situation,
 )
-from scenario_gen.types import Encounter, GenerationResult, NoteKind, Segmentation
+from scenario_gen.types import Encounter, GenerationResult, NoteKind, Request, Segmentation
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"
 
@@ -36,21 +39,46 @@ def result_of(encounter: Encounter) -> GenerationResult:
     return GenerationResult(encounter, segmentation, None, None, ())
 
 
-def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> None:
-    calls = []
+@dataclass(frozen=True, eq=False)
+class ShortRoad(Generation):
+    """Gives no scenario of an encounter in which a vehicle drives farther than a limit [m]."""
 
-    def short_road(template: Encounter, count: int) -> GenerationResult:
-        calls.append(count)
-        longest = max(track.travelled for track in Situation.of(template).tracks)
-        if longest > limit:
-            raise EmptySetError("too long", result_of(template))
-        return result_of(template)
+    road: str = "short"
+    config: PipelineConfig = PipelineConfig()
+    request: Request = Request()
+    seed: int = 7
+    who: int | None = None
+    limit: float = 0.0
+    calls: list[int] = field(default_factory=list)
+    is_planned: bool = False
 
+    def plan(self, encounter: Encounter) -> tuple[None, Encounter]:
+        if not self.is_planned:
+            self.refuse_long(encounter)
+        return None, encounter
+
+    def draw(self, _: None, planned: Encounter, count: int) -> GenerationResult:
+        self.calls.append(count)
+        self.refuse_long(planned)
+        return result_of(planned)
+
+    def refuse_long(self, encounter: Encounter) -> None:
+        tracks = Situation.of(encounter).tracks
+        driven = [track.travelled for n, track in enumerate(tracks) if self.who in (None, n)]
+        if max(driven) > self.limit:
+            raise EmptySetError("too long", result_of(encounter))
+
+
+@pytest.mark.parametrize("is_planned", [False, True])
+def test_the_smallest_loss_that_fits_is_used_and_noted(
+    crossing: Encounter, is_planned: bool
+) -> None:
     situation = Situation.of(crossing)
     longest = max(track.travelled for track in situation.tracks)
-    limit = 0.95 * longest
-    result = fit_what_matters(short_road, crossing, 7)
-    assert (calls[0], calls[-1]) == (7, 7) and len(calls) <= 11
+    short_road = ShortRoad(limit=0.95 * longest, is_planned=is_planned)
+    result = short_road.run(crossing, 7)
+    tried = short_road.calls.count(1)  # once for each part if plans do not tell
+    assert short_road.calls[-1] == 7 and (0 < tried <= 9 if is_planned else tried == 0)
     assert result.encounter.duration > 0.7 * crossing.duration
     assert keeps_interaction(situation, Situation.of(result.encounter))
     (note,) = result.generated.adaptations
@@ -59,14 +87,10 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> N
     copied = pickle.loads(pickle.dumps(result))
     assert list(map(str, copied.generated.adaptations)) == [str(note)]
 
-    loose = fit_what_matters(short_road, crossing, 7, attempt=lambda part: part)
-    assert np.array_equal(loose.encounter.position, result.encounter.position)
-
-    limit = 1.0
     with pytest.raises(
         EmptySetError, match=r"too long. Shortened to its interaction .* within"
     ) as caught:
-        fit_what_matters(short_road, crossing, 7)
+        ShortRoad(limit=1.0, is_planned=is_planned).run(crossing, 7)
     error = pickle.loads(pickle.dumps(caught.value))
     assert (type(error), error.args) == (EmptySetError, caught.value.args)
     assert error.result.encounter.duration == caught.value.result.encounter.duration
@@ -80,16 +104,12 @@ def test_the_beginning_of_a_braking_is_the_last_that_is_lost(crossing: Encounter
     (who,) = {edge.who for edge in situation.reactions.edges}
     assert (shorter[who, 0] > windows[who, 0] + 0.5) and (shorter >= windows).all(axis=0)[0]
     limit = 1.01 * Situation.of(cut(crossing, shorter)).tracks[who].travelled
-
-    def short_road(template: Encounter, _: int) -> GenerationResult:
-        if Situation.of(template).tracks[who].travelled > limit:
-            raise EmptySetError("too long", result_of(template))
-        return result_of(template)
-
-    result = fit_what_matters(short_road, crossing, 7)
-    (note,) = result.generated.adaptations
+    part, made, note = fitting_part(
+        ShortRoad(who=who, limit=limit).plan, crossing, RefusedError("too long")
+    )
+    assert made == (None, part)
     assert f"lost: the beginning of the braking of vehicle {crossing.ids[who]}" in str(note)
-    assert keeps_interaction(situation, Situation.of(result.encounter), whole_braking=False)
+    assert keeps_interaction(situation, Situation.of(part), whole_braking=False)
 
 
 def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:

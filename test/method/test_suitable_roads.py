@@ -12,14 +12,15 @@ from support.textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
+from scenario_gen.method.chain import Generation
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import (
-    on_first_suitable_road,
     suitable_roads,
     with_suitable_roads,
 )
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.roads import ROADS
 from scenario_gen.situation import Situation
 from scenario_gen.types import NoteKind
 from scenario_gen.types.request import Request
@@ -53,22 +54,26 @@ def test_where_roads_suit_but_the_target_cannot_be_had_that_is_said(crossing):
         generate(crossing, "auto", count=1, seed=7, request=Request(target="gap=50..60"))
 
 
-def test_auto_leaves_out_a_road_on_which_vehicles_share_no_area_any_more(crossing):
-    made = generate(crossing, "four_way", count=2, seed=7)
+def test_auto_leaves_out_a_road_on_which_vehicles_share_no_area_any_more(crossing, monkeypatch):
+    draw = Generation.draw
 
-    def on(name):
-        off = np.array([[[1000.0, 0.0]], [[0.0, 0.0]]]) if name == "four_way" else 0.0
+    def drawn_apart(generation, *arguments):
+        made = draw(generation, *arguments)
+        off = np.array([[[1000.0, 0.0]], [[0.0, 0.0]]]) if made.road.name in far else 0.0
         (one, other) = made.generated.scenarios
         apart = replace(other, position=other.position + off)
         return replace(made, generated=replace(made.generated, scenarios=(one, apart)))
 
-    result = on_first_suitable_road(on, crossing, PipelineConfig(), 7)
+    monkeypatch.setattr(Generation, "draw", drawn_apart)
+    far = {"four_way"}
+    result = generate(crossing, "auto", count=2, seed=7)
     assert result.generated.adaptations[0].values["road"] != "four_way"
+    far = set(ROADS.built_in)
     with pytest.raises(
         RefusedError,
         match=r"on road corridor, the last one tried: vehicles .* and .* share no area there in scenario",
     ):
-        on_first_suitable_road(lambda _: on("four_way"), crossing, PipelineConfig(), 7)
+        generate(crossing, "auto", {"fitting.shorten": False}, count=2, seed=7)
 
 
 def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):

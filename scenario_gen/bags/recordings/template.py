@@ -14,12 +14,12 @@ from msg_conventions.hashes import LANES, PLAN
 from msg_conventions.roads import decode_map
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import GenerationResult
+from scenario_gen.types import Planned
 
 NEEDED = ("tracks", "changepoints", "map", PLAN)
 
 
-def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
+def decode_template(messages: Mapping[str, bytes]) -> Planned:
     """Return the fitted template in messages by topic: `NEEDED`, and `road/lanes` if there is one.
 
     Raises:
@@ -35,7 +35,7 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
         raise InputError(
             f"{PLAN}: frame {plan.frame_id!r} is not that of the map, {road.frame_id!r}"
         )
-    return GenerationResult(encounter, segmentation, road, plan.fit(encounter), plan.routes)
+    return Planned(encounter, segmentation, road, plan.fit(encounter), plan.routes)
 
 
 def template_statuses(

@@ -42,6 +42,7 @@ from scenario_gen.types import (
     Interval,
     Note,
     NoteKind,
+    Planned,
     Request,
     ScenarioSet,
     with_witness,
@@ -72,7 +73,7 @@ class SearchRequest:
         assignments: parameters of a drive as name=value.
     """
 
-    planned: GenerationResult
+    planned: Planned
     request: Request
     sampling: SamplingConfig
     limits: Limits
@@ -106,7 +107,7 @@ class SearchRequest:
         return {
             "template": self.planned.encounter.name,
             "decision": str(self.planned.encounter.decision or ""),
-            "road": self.planned.road_and_fit()[0].name,
+            "road": self.planned.road.name,
             "scenarios": str(self.planned.seed),
             "request": parameter_texts(self.request),
             "sampling": parameter_texts(self.sampling),
@@ -324,7 +325,6 @@ def _failures(
 ) -> GenerationResult:
     """Return the failures as the scenarios of a generation, in the order of their drives."""
     encounter = request.planned.encounter
-    fit = request.planned.road_and_fit()[1]
     ordered = sorted(result.findings, key=lambda finding: finding.drive)
     scenarios = tuple(finding.scenario(encounter.decision) for finding in ordered)
     ego = request.request.ego_of(encounter)
@@ -340,12 +340,9 @@ def _failures(
         else json.dumps(value, ensure_ascii=False)
         for name, value in identity.items()
     }
-    return replace(
-        request.planned,
-        fit=replace(fit, requested=requested),
-        generated=ScenarioSet(count, scenarios, count, Counter(), (note,), slot),
-        provenance=provenance | versions(),
-    )
+    generated = ScenarioSet(count, scenarios, count, Counter(), (note,), slot)
+    failures = request.planned.with_scenarios(generated, requested)
+    return replace(failures, provenance=provenance | versions())
 
 
 def _rounded(value: float) -> float | None:

@@ -9,7 +9,7 @@ from scenario_gen.method.sampling.draw import draw_scenarios
 from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.method.sampling.importance_sampling import directions, TargetError
 from scenario_gen.method.sampling.natural import NaturalScenarios
-from scenario_gen.method.sampling.plan import Callbacks, Cancelled, Plan, Progress
+from scenario_gen.method.sampling.plan import Callbacks, Cancelled, OnValid, Plan, Progress
 from scenario_gen.method.sampling.stage import checker_of, sample_scenarios
 from scenario_gen.method.sampling.variation import relaxed_states
 
@@ -19,6 +19,7 @@ __all__ = [
     "Features",
     "NaturalScenarios",
     "Observations",
+    "OnValid",
     "Plan",
     "Posterior",
     "Progress",

@@ -21,7 +21,7 @@ from scenario_gen.types import (
     EgoSlot,
     Encounter,
     Fit,
-    GenerationResult,
+    Planned,
     Request,
     Road,
     Route,
@@ -63,7 +63,7 @@ class Plan:
     @classmethod
     def of(
         cls,
-        planned: GenerationResult,
+        planned: Planned,
         config: SamplingConfig,
         limits: Limits,
         request: Request,
@@ -73,25 +73,21 @@ class Plan:
         """Return the plan of a request, whose states are relaxed where drivers differ.
 
         Args:
-            planned: with road, fit and routes.
+            planned: the template on its road.
             config: the sampler's parameters.
             limits: of the checker.
             request: what is requested.
             waits: that are kept; the template's if None.
             situation: the template's, if it is known.
-
-        Raises:
-            InputError: road or fit are not known.
         """
         situation = situation or Situation.of(planned.encounter)
-        road, fit = planned.road_and_fit()
+        fit, segmentation = planned.fit, planned.segmentation
         states = relaxed_states(fit.requested, situation, config, request)
         if waits is None:
-            waits = situation.waits_to_keep(planned.segmentation)
+            waits = situation.waits_to_keep(segmentation)
         abreast = [_placed_abreast(each, fit) for each in abreast_in_lane(situation.tracks)]
-        return cls(
-            situation, planned.segmentation, road, planned.routes, states, waits, limits, abreast
-        )
+        road, routes = planned.road, planned.routes
+        return cls(situation, segmentation, road, routes, states, waits, limits, abreast)
 
     @property
     def encounter(self) -> Encounter:

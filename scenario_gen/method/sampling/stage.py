@@ -11,11 +11,11 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.draw import draw_scenarios
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.types import GenerationResult, Measures, NoteKind, Request
+from scenario_gen.types import GenerationResult, Measures, NoteKind, Planned, Request
 
 
 def sample_scenarios(
-    planned: GenerationResult,
+    planned: Planned,
     sampling: SamplingConfig = SamplingConfig(),
     limits: Limits = Limits(),
     request: Request = Request(),
@@ -30,7 +30,7 @@ def sample_scenarios(
     Source: paper III-C.
 
     Args:
-        planned: with road, fit, routes and seed.
+        planned: the template on its road.
         sampling: the sampler's parameters.
         limits: of motion, and the checker's.
         request: what is requested.
@@ -40,7 +40,7 @@ def sample_scenarios(
         measures: measures scenarios for a target.
 
     Raises:
-        InputError: road or fit are not known, or decisions are to be drawn.
+        InputError: decisions are to be drawn.
         RefusedError: as `draw_scenarios`.
     """
     if sampling.decisions == "drawn" and planned.encounter.decision is None:
@@ -59,13 +59,13 @@ def sample_scenarios(
         callbacks=callbacks,
         measures=measures,
     )
-    road, fit = planned.road_and_fit()
-    notes = road.lanes.notes if road.lanes is not None else ()
+    lanes = planned.road.lanes
+    notes = lanes.notes if lanes is not None else ()
     mirrored = [note for note in notes if note.kind is NoteKind.MIRRORED]
     generated = replace(
         generated, adaptations=(*mirrored, *generated.adaptations), graph=plan.situation.reactions
     )
-    return replace(planned, fit=replace(fit, requested=plan.requested), generated=generated)
+    return planned.with_scenarios(generated, plan.requested)
 
 
 def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Request) -> Checker:

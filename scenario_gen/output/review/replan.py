@@ -25,7 +25,7 @@ from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.situation import Situation
-from scenario_gen.types import GenerationResult, Request
+from scenario_gen.types import Planned, Request
 
 
 def recorded_scenarios(
@@ -47,7 +47,7 @@ def recorded_scenarios(
 class Replanned:
     """The source of the scenarios of a request: template on its road, request, parameters."""
 
-    planned: GenerationResult
+    planned: Planned
     request: Request
     sampling: SamplingConfig
     limits: Limits
@@ -85,13 +85,12 @@ def replanned(
         published = _find(bag, entries, first.index, namespace, first.request)
         source = _replan(published, f"{bag}: request {published.entry.request}")
         entry, planned = published.entry, source.planned
-        road, _ = planned.road_and_fit()
         encounter = planned.encounter
         encounter = replace(encounter, name=entry.template or encounter.name)
         planned = replace(
             planned,
             encounter=encounter,
-            road=replace(road, name=entry.road or road.name),
+            road=replace(planned.road, name=entry.road or planned.road.name),
         )
         return replace(source, planned=planned)
 
@@ -111,7 +110,7 @@ def _replan(published: "_Published", origin: str) -> Replanned:
     if requested.moves:  # the bag's fit may belong to another request
         encounter = template.encounter
         segmentation = template.segmentation
-        road, _ = template.road_and_fit()
+        road = template.road
         fitting = read_parameters(FittingConfig(), values, "fitting.", origin)
         planning = read_parameters(PlanningConfig(), values, "planning.", origin)
         situation = Situation.of(encounter)
@@ -119,7 +118,7 @@ def _replan(published: "_Published", origin: str) -> Replanned:
             situation, segmentation, road, fitting, request=requested, limits=limits
         )
         routes = plan_routes(road, fit, planning, seed, limits)
-        planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+        planned = Planned(encounter, segmentation, road, fit, routes, seed)
     return Replanned(planned, requested, sampling, limits)
 
 
@@ -132,7 +131,7 @@ class _Published:
     summary: RequestSummary
     messages: tuple[BagMessage, ...]
 
-    def template(self, origin: str) -> GenerationResult:
+    def template(self, origin: str) -> Planned:
         """Return the template; `origin` names bag and request in messages.
 
         Raises:

@@ -42,7 +42,7 @@ def request_part(
     Raises:
         RefusedError: no part fits.
     """
-    part, note = fitting_part(attempt, encounter, refusal, config)
+    part, _, note = fitting_part(attempt, encounter, refusal, config)
     if part.start_ns == encounter.start_ns:
         part = cut(part, np.maximum(part.time[part.present], part.dt))
     node.outputs.send(TOPIC, encode_tracks(part))

@@ -14,8 +14,8 @@ request, `~/cancel` all.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import lru_cache, partial
+from dataclasses import dataclass, replace
+from functools import partial
 import os
 import threading
 
@@ -27,11 +27,10 @@ from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.base.provenance import parameter_texts, versions
-from scenario_gen.method.chain import Chain, plan_set
+from scenario_gen.method.chain import Chain, Generation
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
-from scenario_gen.method.sampling import Callbacks, Cancelled
-from scenario_gen.method.shortening import fit_what_matters
+from scenario_gen.method.sampling import Callbacks, Cancelled, OnValid
 from scenario_gen.ros.common.generate_action import action_type, Goals
 from scenario_gen.ros.common.requests import (
     Answer,
@@ -47,6 +46,7 @@ from scenario_gen.types import (
     EgoSlot,
     Encounter,
     GenerationResult,
+    Planned,
     Scenario,
     token,
 )
@@ -191,43 +191,13 @@ class GpSampler(StageNode):
         """
         template = decode_template(messages)
         encounter = template.encounter
-        road, _ = template.road_and_fit()
         inputs = {topic: hash_of(topic, messages[topic]) for topic in ("tracks", "map")}
         encoder = RequestMessages(encounter, request.name, inputs)
-        publisher = ScenarioPublisher(encoder, road.frame_id, partial(self._send, stop=stop))
-
-        sets: list[GenerationResult] = []
-
-        def advance(done: int, _total: int, candidates: int) -> None:
-            request.progress(done + sum(map(len, sets)), candidates, encounter.start_ns)
-
-        def publish(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
-            with self._turn:
-                publisher.scenario(scenario, requested, ego)
-
-        def generate(part: Encounter, count: int) -> GenerationResult:
-            if part.made == "recorded":
-                callbacks = Callbacks(advance, stop, on_valid=publish)
-                return _sample(replace(template, encounter=part), config, count, callbacks)
-            plan = lru_cache(maxsize=1)(
-                partial(
-                    plan_set,
-                    road=road,
-                    config=_stages(part, config),
-                    seed=config.seed,
-                    request=config,
-                )
-            )
-
-            def sampled(template: Encounter, size: int) -> GenerationResult:
-                return plan(template).sample(size, Callbacks(advance, stop))
-
-            made = fit_what_matters(sampled, part, count, config.fitting, attempt=plan)
-            sets.append(made)
-            return made
-
+        send = partial(self._send, stop=stop)
+        publisher = ScenarioPublisher(encoder, template.road.frame_id, send)
+        sets = _Sets(template, config, stop, request, partial(self._publish, publisher))
         results = outcome_sets(
-            generate, encounter, config.sampling, config, config.count, config.seed
+            sets.generate, encounter, config.sampling, config, config.count, config.seed
         )
         provenance = parameter_texts(config) | versions()
         for each in results:
@@ -249,6 +219,17 @@ class GpSampler(StageNode):
             with self._turn:
                 publisher.close(result, summary)
         return outcome, summary
+
+    def _publish(
+        self,
+        publisher: ScenarioPublisher,
+        scenario: Scenario,
+        requested: BoundaryStates,
+        ego: EgoSlot | None,
+    ) -> None:
+        """Publish a scenario; no other request publishes one at the same time."""
+        with self._turn:
+            publisher.scenario(scenario, requested, ego)
 
     def _send_outcome(
         self,
@@ -276,26 +257,63 @@ class GpSampler(StageNode):
         )
 
 
-def _sample(
-    template: GenerationResult, config: Config, count: int, callbacks: Callbacks
-) -> GenerationResult:
-    """Sample scenarios, after a new plan if start or end states are requested.
+@dataclass(eq=False)
+class _Sets:
+    """The sets of a request; those of outcomes that were not recorded are published later.
 
-    Raises:
-        RefusedError: the request is impossible.
+    Attributes:
+        template: planned on its road.
+        config: the request's parameters.
+        stop: whether it has to stop.
+        request: is told the progress.
+        publish: called with each scenario of the recorded outcome.
+        done: scenarios in the sets so far.
     """
-    road, _ = template.road_and_fit()
-    chain = Chain(
-        Situation.of(template.encounter),
-        template.segmentation,
-        road,
-        _stages(template.encounter, config),
-        config,
-        config.count,
-        config.seed,
-    )
-    planned = chain.plan() if config.moves else replace(template, seed=config.seed)
-    return replace(chain, count=count).sample(planned, callbacks)
+
+    template: Planned
+    config: Config
+    stop: Cancelled
+    request: OpenRequest
+    publish: OnValid
+    done: int = 0
+
+    def generate(self, part: Encounter, count: int) -> GenerationResult:
+        """Return the scenarios of an outcome.
+
+        Raises:
+            RefusedError: there are none.
+        """
+        config, callbacks = self.config, Callbacks(self._advance, self.stop)
+        stages = _stages(part, config)
+        if part.made == "recorded":
+            callbacks = replace(callbacks, on_valid=self.publish)
+            return self._recorded(part, stages, count, callbacks)
+        generation = Generation(
+            self.template.road, stages, config, config.seed, callbacks=callbacks
+        )
+        made = generation.run(part, count)
+        self.done += len(made)
+        return made
+
+    def _recorded(
+        self, part: Encounter, stages: PipelineConfig, count: int, callbacks: Callbacks
+    ) -> GenerationResult:
+        """Return scenarios of the template, planned anew if start or end states are requested."""
+        template, config = replace(self.template, encounter=part), self.config
+        chain = Chain(
+            Situation.of(part),
+            template.segmentation,
+            template.road,
+            stages,
+            config,
+            count,
+            config.seed,
+        )
+        planned = chain.plan() if config.moves else replace(template, seed=config.seed)
+        return chain.sample(planned, callbacks)
+
+    def _advance(self, done: int, _total: int, candidates: int) -> None:
+        self.request.progress(self.done + done, candidates, self.template.encounter.start_ns)
 
 
 def _stages(encounter: Encounter, config: Config) -> PipelineConfig:

@@ -50,7 +50,7 @@ from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation, tokens
+from scenario_gen.types import Encounter, Planned, Road, Segmentation, tokens
 
 
 @dataclass(frozen=True)
@@ -110,26 +110,16 @@ class Planner(StageNode):
         pipeline = PipelineConfig(
             fitting=config.fitting, planning=config.planning, limits=config.limits
         )
-
-        def plan(part: Encounter) -> GenerationResult:
-            stop_if_cancelled()
-            chain = Chain(
-                Situation.of(part),
-                _part_of(segmentation, encounter, part),
-                road,
-                pipeline,
-                seed=config.seed,
-            )
-            return chain.plan()
-
+        whole = Chain(Situation.of(encounter), segmentation, road, pipeline, seed=config.seed)
         try:
-            planned = plan(encounter)
+            planned = whole.plan()
         except RefusedError as error:
             if not config.fitting.shorten:
                 raise
-            request_part(self, plan, encounter, error, config.fitting)
+            plan_part = partial(_plan_part, whole)
+            request_part(self, plan_part, encounter, error, config.fitting)
             return
-        (_, fit), routes = planned.road_and_fit(), planned.routes
+        fit, routes = planned.fit, planned.routes
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {
@@ -182,6 +172,13 @@ class Planner(StageNode):
         elif plan := await self.result_of(name, job, lambda _: b""):
             response.plan = deserialize_message(plan, Path)
         return response
+
+
+def _plan_part(whole: Chain, part: Encounter) -> Planned:
+    """Return a part of a template, planned."""
+    stop_if_cancelled()
+    segmentation = _part_of(whole.segmentation, whole.encounter, part)
+    return replace(whole, situation=Situation.of(part), segmentation=segmentation).plan()
 
 
 def _part_of(segmentation: Segmentation, whole: Encounter, part: Encounter) -> Segmentation:

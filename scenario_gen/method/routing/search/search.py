@@ -4,6 +4,7 @@
 """A search in progress: both trees, the budget, and the best path so far."""
 
 from collections.abc import Iterator
+from functools import cached_property
 import math
 from time import thread_time
 
@@ -40,14 +41,14 @@ class Search:
     ) -> None:
         self.road, self.scene, self.rules = road, scene, rules
         self.started = thread_time()
-        self.rng = np.random.default_rng(seed % 2**64)
+        self.seed = seed % 2**64
         self.limit: int | None = None
         self.best = np.inf
         self.path: Floats | None = None
         self.cost = np.inf
         self.history: list[tuple[int, float, float]] = []
         self._straight = math.dist(ends[0][:2], ends[1][:2])
-        self.state = np.array([(0, 0, 0, np.inf, seed % 2**64)], dtype=STATE)
+        self.state = np.array([(0, 0, 0, np.inf, self.seed)], dtype=STATE)
         self.meeting = np.empty((INITIAL_COUNT, 2), dtype=np.int64)
         self._best_meeting = -1
         start, goal = ends
@@ -104,6 +105,11 @@ class Search:
     def _tighten_bound(self, cost: float) -> None:
         if self.rules.informed:
             self.state["bound"] = min(self.state["bound"][0], cost)
+
+    @cached_property
+    def rng(self) -> np.random.Generator:
+        """Random numbers of the planner's own."""
+        return np.random.default_rng(self.seed)
 
     @property
     def iteration(self) -> int:
