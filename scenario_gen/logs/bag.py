@@ -3,26 +3,26 @@
 
 """Bags of rosbag2 and ROS 1: fixes, speeds, odometry, tracked objects or encounters."""
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.definitions import TRACKED
-from scenario_gen.bags.storage.messages import BagTopic
+from scenario_gen.bags.storage.messages import BagMessage, BagTopic
 from scenario_gen.bags.vehicles import (
     decode_samples,
-    decode_tracked,
     decode_tracks,
     FIX,
     ODOMETRY,
     POSE,
     POSE_WITH_COVARIANCE,
+    Samples,
     TRACKS,
     TRANSFORMS,
     TWIST,
@@ -44,7 +44,7 @@ from scenario_gen.logs.frames import (
     FrameTree,
     in_one_frame,
     Recording,
-    Recordings,
+    recordings_of,
 )
 from scenario_gen.logs.growing import Span
 from scenario_gen.logs.quality import Doubt
@@ -53,12 +53,10 @@ from scenario_gen.logs.raw import (
     check_vehicles,
     Observations,
     RawLog,
-    Rows,
     Segment,
 )
 from scenario_gen.types import Encounter
 
-_CLOCK_SAMPLES_COUNT = 1_000  # messages of a topic whose stamps are compared
 _POSES = (POSE, POSE_WITH_COVARIANCE)
 READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED, *_POSES, TRANSFORMS)
 _REQUESTED_POSES = ("goal", "goal_pose", "initialpose", "clicked_point")  # not of a vehicle
@@ -74,7 +72,7 @@ class Topic:
         label: the log's name in messages to the user.
         bag: name of the bag, if several have the topic at one time; else "".
         stamps: log stamps [ns].
-        data: CDR bytes; empty once a message is decoded.
+        data: CDR bytes; empty once they are decoded.
         part: the window of time that is read, if not all of it; else "".
     """
 
@@ -89,6 +87,17 @@ class Topic:
     def where(self, number: int) -> str:
         """Name the log, the topic and a message."""
         return f"{self.label}, topic {self.name}{self.part}, message {number}"
+
+    def decoded(self) -> list[Samples]:
+        """Return the states in its messages, whose bytes are given up to bound the memory.
+
+        Raises:
+            InputError: a message is damaged.
+        """
+        samples = decode_samples(self.data, self.type, lambda row: self.where(row + 1))
+        if self.type != TRANSFORMS:  # which are decoded for the frames, and again for vehicles
+            self.data.clear()
+        return samples
 
     def segment(self, first_row: int) -> Segment:
         """Return the place of its messages, which are rows of the log from `first_row` on."""
@@ -151,13 +160,8 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> tuple[list[Topic],
     n_rows = 0
     for path, name in zip(paths, bags, strict=True):
         with open_bag(path, bounds, "log.size_limit") as bag:
-            for message in bag.messages(is_used, window):
-                n_rows += 1
-                check_size(str(path), 0, n_rows, config)
-                key = message.topic, name
-                topic = topics.setdefault(key, Topic(message.topic, message.type, label, name))
-                topic.stamps.append(message.stamp_ns)
-                topic.data.append(message.data)
+            n_rows += _add_messages(topics, bag.messages(is_used, window), label, name)
+            check_size(str(path), 0, n_rows, config)
     if window:
         for topic in topics.values():
             topic.part = f" from {config.start:g} s on"
@@ -169,6 +173,21 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> tuple[list[Topic],
             "choose with --set log.topics=…, or convert others with topic_tools"
         )
     return _joined([topics[key] for key in sorted(topics)]), tuple(missing)
+
+
+def _add_messages(
+    topics: dict[tuple[str, str], Topic], messages: Iterable[BagMessage], label: str, bag: str
+) -> int:
+    """Add messages to their topics, and return their number."""
+    count = 0
+    for count, message in enumerate(messages, 1):  # noqa: B007
+        key = message.topic, bag
+        topic = topics.get(key)
+        if topic is None:
+            topic = topics[key] = Topic(message.topic, message.type, label, bag)
+        topic.stamps.append(message.stamp_ns)
+        topic.data.append(message.data)
+    return count
 
 
 def _usable(requested: Sequence[str]) -> Callable[[str, str], bool]:
@@ -261,7 +280,7 @@ def _read_streams(
         name=name,
         geographic=any(topic.type == FIX for topic in topics),
         vehicles=tuple(vehicles.values()),
-        rows=sum(len(topic.data) for topic in topics),
+        rows=sum(len(topic.stamps) for topic in topics),
         segments=tuple(segments),
         notes=(*notes, *frame_notes, *_notes(vehicles, clocks)),
         doubts=(*frame_doubts, *doubts),
@@ -290,7 +309,7 @@ def _collect_all(
         recorded, clock = _collect(topic, owner, n_rows, config)
         recordings += recorded
         clocks.append(clock)
-        n_rows += len(topic.data)
+        n_rows += len(topic.stamps)
     if set(types) == {TRANSFORMS}:
         recordings = bodies_of(recordings)
     return recordings, clocks, segments
@@ -344,31 +363,28 @@ def _frame_tree(topics: Sequence[Topic]) -> FrameTree:
     """
     tree = FrameTree()
     for topic in topics:
-        if topic.type != TRANSFORMS:
-            continue
-        for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-            for sample in decode_samples(data, topic.type, topic.where(number + 1)):
-                assert sample.position is not None
-                stamp_ns = sample.stamp_ns or received_ns
-                tree.add(sample.frame, sample.child, stamp_ns, *sample.position, sample.heading)
+        if topic.type == TRANSFORMS:
+            for each in topic.decoded():
+                assert each.fix is not None
+                place = each.fix[:, 0] + 1j * each.fix[:, 1]
+                tree.add(each.frame, each.child, each.stamp_ns, place, each.heading)
     return tree
 
 
 def _observed(name: str, recordings: Sequence[Recording]) -> Observations:
-    """Return what topics recorded of one vehicle."""
-    rows = Rows(
-        [fix for recording in recordings for fix in recording.rows.fixes],
-        [speed for recording in recordings for speed in recording.rows.speeds],
-    )
-    sizes = [size for recording in recordings for size in recording.sizes]
-    kinds = sum((recording.kinds for recording in recordings), Counter[str]())
-    length, width = np.median(np.array(sizes), axis=0).tolist() if sizes else (np.nan, np.nan)
+    """Return what topics recorded of one vehicle: positions of one, speeds of all."""
+    observed = [recording.observed for recording in recordings]
+
+    def joined(quantity: str) -> Any:
+        return np.concatenate([getattr(each, quantity) for each in observed])
+
     return replace(
-        rows.observations(name),
-        length=length,
-        width=width,
-        kind=kinds.most_common(1)[0][0] if kinds else "",
-        ahead=next((each.ahead for each in recordings if each.rows.fixes), np.nan),
+        next(each for each in observed if len(each.fix_ns)),
+        id=name,
+        speed_ns=joined("speed_ns"),
+        speed=joined("speed"),
+        speed_row=joined("speed_row"),
+        course=joined("course"),
     )
 
 
@@ -381,7 +397,7 @@ def _check_positions(label: str, recordings: Sequence[Recording]) -> None:
     without = [
         vehicle
         for vehicle, group in by_vehicle(recordings).items()
-        if not any(recording.rows.fixes for recording in group)
+        if not any(recording.has_fixes for recording in group)
     ]
     if without:
         raise InputError(
@@ -407,24 +423,22 @@ def _collect(
     Raises:
         InputError: a message is damaged.
     """
-    stride = max(len(topic.data) // _CLOCK_SAMPLES_COUNT, 1)
-    clock = TopicClock(topic.name, owner or topic.name, config.stamps == "header", stride)
-    collected = Recordings(topic.name, topic.type)
-    for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        row = first_row + number
-        place = topic.where(number + 1)
-        if topic.type == TRACKED:
-            header_ns, frame, objects = decode_tracked(data, place)
-            stamp_ns = clock.add(number, header_ns, received_ns)
-            collected.add_objects(objects, frame, stamp_ns, row)
-        else:
-            for sample in decode_samples(data, topic.type, place):
-                stamp_ns = clock.add(number, sample.stamp_ns, received_ns)
-                collected.add_sample(sample, stamp_ns, row)
-        topic.data[number] = b""  # bounds the memory
-    if topic.type not in (TRACKED, TRANSFORMS):
-        collected.rename_only(owner)
-    return list(collected.by_vehicle_and_frame.values()), clock
+    samples = topic.decoded()
+    received = np.array(topic.stamps, dtype=np.int64)
+    header = np.zeros_like(received)
+    for each in samples:
+        header[each.row] = each.stamp_ns
+    clock = TopicClock(topic.name, owner or topic.name, header, received)
+    if config.stamps == "header":
+        stamps = [np.where(each.stamp_ns, each.stamp_ns, received[each.row]) for each in samples]
+    else:
+        stamps = [received[each.row] for each in samples]
+    timed = [replace(each, stamp_ns=ns) for each, ns in zip(samples, stamps, strict=True)]
+    recordings = recordings_of(topic.name, timed, first_row)
+    names = {recording.vehicle for recording in recordings}
+    if topic.type not in (TRACKED, TRANSFORMS) and len(names) == 1:
+        recordings = [replace(recording, vehicle=owner) for recording in recordings]
+    return recordings, clock
 
 
 def _read_encounters(topics: Sequence[Topic], name: str) -> RawLog:

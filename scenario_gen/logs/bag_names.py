@@ -4,7 +4,7 @@
 """Topics of a bag: vehicles by name, frames and clocks."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -17,6 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.growing import Span
 from scenario_gen.logs.quality import Doubt, Quantity
+from scenario_gen.numerics import Ints
 
 _BODY_FRAMES = ("base_link", "base_footprint", "base", "body", "chassis")
 _BETTER_NAMES = (
@@ -138,44 +139,34 @@ _MIN_MESSAGES_COUNT = 5
 _OTHER_UNIT_RATIO = 100.0  # of the rates; no simulation is so fast
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class TopicClock:
-    """Stamps [ns] of a topic's headers, and of the reception of its messages.
+    """Stamps (F,) [ns] of a topic's headers, 0 if they have none, and of their reception.
 
     Attributes:
         topic: its name.
         vehicle: its owner.
-        uses_header: whether the stamps of the headers count.
-        stride: every how many messages the stamps are kept.
-        header: stamps of some messages.
+        header: stamps of the headers.
         received: stamps of the same messages.
-        has_stamps: whether all headers have stamps.
     """
 
     topic: str
     vehicle: str
-    uses_header: bool = True
-    stride: int = 1
-    header: list[int] = field(default_factory=list)
-    received: list[int] = field(default_factory=list)
-    has_stamps: bool = True
+    header: Ints
+    received: Ints
 
-    def add(self, number: int, header_ns: int, received_ns: int) -> int:
-        """Add a message by its number; return the stamp that counts."""
-        self.has_stamps = self.has_stamps and header_ns != 0
-        if number % self.stride == 0:
-            self.header.append(header_ns)
-            self.received.append(received_ns)
-        return header_ns if header_ns and self.uses_header else received_ns
+    @property
+    def has_stamps(self) -> bool:
+        """Whether all headers have stamps."""
+        return bool(self.header.all())
 
     @property
     def rate(self) -> float:
         """How fast the headers' clock runs against the recorder's; NaN if unknown."""
-        header = self.header[-1] - self.header[0] if self.header else 0
-        received = self.received[-1] - self.received[0] if self.received else 0
-        if len(self.header) < _MIN_MESSAGES_COUNT or received <= 0 or not self.has_stamps:
+        if len(self.header) < _MIN_MESSAGES_COUNT or not self.has_stamps:
             return np.nan
-        return header / received
+        header, received = (int(ns[-1] - ns[0]) for ns in (self.header, self.received))
+        return header / received if received > 0 else np.nan
 
     def ahead_s(self) -> tuple[float, float]:
         """Return how far the headers are ahead of the reception [s] at begin and end, or NaN.
@@ -184,7 +175,7 @@ class TopicClock:
         """
         if len(self.header) < _MIN_MESSAGES_COUNT or not self.has_stamps:
             return np.nan, np.nan
-        ahead = (np.array(self.header) - np.array(self.received)) * 1e-9
+        ahead = (self.header - self.received) * 1e-9
         count = max(len(ahead) // 10, _MIN_MESSAGES_COUNT)
         parts = ahead[:count], ahead[-count:]
         if max(float(np.ptp(np.percentile(part, [20.0, 80.0]))) for part in parts) > _MAX_JITTER_S:

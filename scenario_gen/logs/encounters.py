@@ -117,24 +117,38 @@ class _Cuts:
     bridged: Bools
 
 
-def pieces_of(
-    track: Observations, origin_ns: int, config: LogConfig, *, smooth: bool = True
-) -> tuple[list[Piece], VehicleQuality]:
-    """Cut a track at gaps, relocations and reversals, and smooth each piece.
+@dataclass(frozen=True, eq=False)
+class CutTrack:
+    """A track in parts, each with its motion as recorded; None if it is too short."""
+
+    track: Observations
+    cuts: _Cuts
+    parts: list[tuple[Observations, Smooth | None]]
+
+
+def cut_track(track: Observations, origin_ns: int, config: LogConfig) -> CutTrack:
+    """Cut a track at gaps, relocations and reversals.
 
     Gaps of up to two and a half periods of the source are bridged, so that a source of 1 Hz is not
-    cut at every fix. With `smooth` false, the pieces are as recorded.
+    cut at every fix.
     """
     cuts = _find_cuts(track, config)
     parts = _split(track, cuts.any)
-    smoothed: list[tuple[Observations, Smooth | None]] = []
+    return CutTrack(
+        track, cuts, [(part, interpolated_piece(part, origin_ns, config)) for part in parts]
+    )
+
+
+def pieces_of(
+    cut: CutTrack, origin_ns: int, config: LogConfig, *, smooth: bool = True
+) -> tuple[list[Piece], VehicleQuality]:
+    """Return the parts of a track, smoothed, or as recorded."""
+    track = cut.track
+    smoothed = [] if smooth else cut.parts
     lost_s = 0.0
-    for part in parts:
-        if not smooth:
-            smoothed.append((part, interpolated_piece(part, origin_ns, config)))
-            continue
+    for part, recorded in cut.parts if smooth else ():
         try:
-            smoothed += _steerable(part, origin_ns, config)
+            smoothed += _steerable(part, recorded, origin_ns, config)
         except UnreconciledError:
             smoothed.append((part, None))
             lost_s += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
@@ -145,8 +159,8 @@ def pieces_of(
         for part, motion in smoothed
         if motion is not None
     ]
-    extra_reversals = len(smoothed) - len(parts)
-    return pieces, _vehicle_quality(track, pieces, cuts, extra_reversals, lost_s, config)
+    extra_reversals = len(smoothed) - len(cut.parts)
+    return pieces, _vehicle_quality(track, pieces, cut.cuts, extra_reversals, lost_s, config)
 
 
 def _find_cuts(track: Observations, config: LogConfig) -> _Cuts:
@@ -274,7 +288,11 @@ def _moved_ahead(smooth: Smooth, distance: float) -> Smooth:
 
 
 def _steerable(
-    part: Observations, origin_ns: int, config: LogConfig, depth: int = 0
+    part: Observations,
+    recorded: Smooth | None,
+    origin_ns: int,
+    config: LogConfig,
+    depth: int = 0,
 ) -> list[tuple[Observations, Smooth | None]]:
     """Smooth a part of a track, cut wherever its path turns more sharply than a car can.
 
@@ -285,9 +303,11 @@ def _steerable(
     """
     if depth > _MAX_CUT_DEPTH_COUNT:
         raise UnreconciledError("the path turns more sharply than a car can, again and again")
-    smooth = smooth_piece(part, origin_ns, config)
+    if recorded is None:
+        return [(part, None)]
+    smooth = smooth_piece(part, recorded, origin_ns, config)
     kind = VEHICLE_TYPES[part.kind or CAR]
-    if smooth is None or kind.walks:
+    if kind.walks:
         return [(part, smooth)]
     max_curvature = max(
         _LIMITS.max_car_curvature_per_m, _LIMITS.curvature_factor * kind.dynamics.sharpest
@@ -302,7 +322,8 @@ def _steerable(
     cuts[np.clip(fix, 1, len(cuts)) - 1] = True
     pieces = []
     for half in _split(part, cuts):
-        pieces += _steerable(half, origin_ns, config, depth + 1)
+        recorded = interpolated_piece(half, origin_ns, config)
+        pieces += _steerable(half, recorded, origin_ns, config, depth + 1)
     return pieces
 
 

@@ -3,20 +3,20 @@
 
 """Coordinate frames of a bag: which frames transforms tie to each other, and positions in them."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-import math
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenario_gen.bags.vehicles import Sample, TrackedObject
+from scenario_gen.bags.vehicles import Samples
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.bag_names import child_vehicle
 from scenario_gen.logs.config import POINTS
 from scenario_gen.logs.quality import Doubt, Quantity
-from scenario_gen.logs.raw import Fix, Rows, Speed
+from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 
 Complexes = NDArray[np.complex128]
@@ -33,79 +33,65 @@ class Recording:
     Attributes:
         vehicle: its name.
         topic: name of the topic.
-        type: of its messages.
         frame: of the positions, or "".
         child: frame whose pose it is, or "".
-        rows: positions and speeds.
-        sizes: length and width [m] of tracked objects.
-        kinds: labels of tracked objects.
-        ahead: how far the centre is ahead of the positions, in vehicle lengths; NaN if unknown.
+        observed: positions and speeds.
     """
 
     vehicle: str
     topic: str
-    type: str
     frame: str
     child: str
-    rows: Rows = field(default_factory=Rows)
-    sizes: list[tuple[float, float]] = field(default_factory=list)
-    kinds: Counter[str] = field(default_factory=Counter)
-    ahead: float = math.nan
+    observed: Observations
+
+    @property
+    def has_fixes(self) -> bool:
+        """Whether it has positions."""
+        return len(self.observed.fix_ns) > 0
 
 
-@dataclass
-class Recordings:
-    """What one topic has recorded so far.
+def recordings_of(topic: str, samples: Iterable[Samples], first_row: int) -> list[Recording]:
+    """Return what a topic recorded of each vehicle in each frame.
 
-    Attributes:
+    Args:
         topic: its name.
-        type: of its messages.
-        by_vehicle_and_frame: the recordings.
-        vehicles: by their child frames.
+        samples: its messages, with the stamps that count.
+        first_row: row of the log of its first message.
     """
+    groups: dict[tuple[str, str], list[Samples]] = {}
+    for each in samples:
+        groups.setdefault((child_vehicle(each.child), each.frame), []).append(each)
+    return [
+        Recording(name, topic, frame, parts[0].child, _observed(name, parts, first_row))
+        for (name, frame), parts in groups.items()
+    ]
 
-    topic: str
-    type: str
-    by_vehicle_and_frame: dict[tuple[str, str], Recording] = field(default_factory=dict)
-    vehicles: dict[str, str] = field(default_factory=dict)
 
-    def add_objects(
-        self, objects: Iterable[TrackedObject], frame: str, stamp_ns: int, row: int
-    ) -> None:
-        """Add the tracked objects of a message."""
-        for tracked in objects:
-            recording = self._recording_of(tracked.id, frame, "")
-            state = (*tracked.position, tracked.heading, tracked.height)
-            recording.rows.fixes.append(Fix(stamp_ns, row, *state))
-            recording.rows.speeds.append(Speed(stamp_ns, row, tracked.speed))
-            recording.sizes.append(tracked.size)
-            recording.kinds[tracked.kind] += 1
+def _observed(vehicle: str, parts: Sequence[Samples], first_row: int) -> Observations:
+    """Return samples of one vehicle in one frame, in the order of the messages."""
+    order = np.argsort(np.concatenate([part.row for part in parts]), kind="stable")
 
-    def add_sample(self, sample: Sample, stamp_ns: int, row: int) -> None:
-        """Add position and speed of a vehicle, as far as the message has them."""
-        if sample.child not in self.vehicles:
-            self.vehicles[sample.child] = child_vehicle(sample.child)
-        vehicle = self.vehicles[sample.child]
-        rows = self._recording_of(vehicle, sample.frame, sample.child).rows
-        if sample.position is not None:
-            state = (*sample.position, sample.heading, sample.height)
-            rows.fixes.append(Fix(stamp_ns, row, *state))
-        if sample.speed is not None:
-            rows.speeds.append(Speed(stamp_ns, row, sample.speed, sample.course))
+    def joined(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])[order]
 
-    def rename_only(self, vehicle: str) -> None:
-        """Name the vehicle if there is only one."""
-        recordings = self.by_vehicle_and_frame.values()
-        if len({recording.vehicle for recording in recordings}) == 1:
-            for recording in recordings:
-                recording.vehicle = vehicle
-
-    def _recording_of(self, vehicle: str, frame: str, child: str) -> Recording:
-        key = vehicle, frame
-        if key not in self.by_vehicle_and_frame:
-            made = Recording(vehicle, self.topic, self.type, frame, child)
-            self.by_vehicle_and_frame[key] = made
-        return self.by_vehicle_and_frame[key]
+    rows, stamps = first_row + joined("row"), joined("stamp_ns")
+    n_fixes = 0 if parts[0].fix is None else len(rows)
+    n_speeds = 0 if parts[0].speed is None else len(rows)
+    return Observations(
+        id=vehicle,
+        fix_ns=stamps[:n_fixes],
+        fix=joined("fix") if n_fixes else np.zeros((0, 2)),
+        fix_row=rows[:n_fixes],
+        heading=joined("heading")[:n_fixes],
+        speed_ns=stamps[:n_speeds],
+        speed=joined("speed") if n_speeds else np.zeros(0),
+        speed_row=rows[:n_speeds],
+        length=float(parts[0].size[0]),
+        width=float(parts[0].size[1]),
+        kind=parts[0].kind,
+        height=joined("height")[:n_fixes],
+        course=joined("course")[:n_speeds],
+    )
 
 
 def by_vehicle(recordings: Iterable[Recording]) -> dict[str, list[Recording]]:
@@ -132,18 +118,18 @@ def _last(frame: str) -> str:
 
 @dataclass
 class FrameTree:
-    """Transforms from frames to their parents: (stamp [ns], x [m], y [m], turn [rad]) of each."""
+    """Transforms from frames to their parents: (stamp [ns], x + iy [m], turn [rad]) of each."""
 
-    transforms: dict[str, list[tuple[int, float, float, float]]] = field(
+    transforms: dict[str, list[tuple[Ints, Complexes, Floats]]] = field(
         default_factory=lambda: defaultdict(list)
     )
     parents: dict[str, str] = field(default_factory=dict)
 
-    def add(self, parent: str, child: str, stamp_ns: int, x: float, y: float, turn: float) -> None:
-        """Add a transform; a second parent of a frame is ignored."""
+    def add(self, parent: str, child: str, stamps: Ints, place: Complexes, turn: Floats) -> None:
+        """Add transforms (F,); a second parent of a frame is ignored."""
         child, parent = child.strip("/"), parent.strip("/")
         if child != parent and self.parents.setdefault(child, parent) == parent:
-            self.transforms[child].append((stamp_ns, x, y, turn))
+            self.transforms[child].append((stamps, place, turn))
 
     def chain(self, frame: str) -> list[str]:
         """Return a frame and all above it; the last one is its root."""
@@ -156,57 +142,51 @@ class FrameTree:
         """Return the frame without a parent that a frame is tied to."""
         return self.chain(frame)[-1]
 
-    def in_root(self, frame: str, fixes: Sequence[Fix]) -> list[Fix]:
-        """Return fixes in a frame as fixes in its root, with x east and y north."""
-        stamps = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
-        place, heading = _poses(fixes)
+    def in_root(self, frame: str, observed: Observations) -> Observations:
+        """Return positions in a frame as positions in its root, with x east and y north."""
+        place, heading = _place(observed), observed.heading
         for child in self.chain(frame):
             points_north = child.endswith(_NORTH_FIRST)
             if points_north:
                 place, heading = 1j * np.conj(place), 0.5 * np.pi - heading
             if child in self.parents:
-                origin, turn = self._transforms_at(child, stamps)
+                origin, turn = self._transforms_at(child, observed.fix_ns)
                 turn = turn * (not points_north)
                 place, heading = origin + np.exp(1j * turn) * place, heading + turn
-        return _at_places(fixes, place, heading)
+        return _moved(observed, place, heading)
 
     def _transforms_at(self, child: str, stamps: Ints) -> tuple[Complexes, Floats]:
         """Return origin (F,) and turn (F,) of a frame in its parent at stamps (F,)."""
-        known = sorted(self.transforms[child])
-        seconds = np.array([entry[0] - known[0][0] for entry in known]) * 1e-9
-        x, y, turn = np.array([entry[1:] for entry in known]).T
-        wanted = (stamps - known[0][0]) * 1e-9
-        origin = np.interp(wanted, seconds, x + 1j * y)
-        return np.asarray(origin), np.interp(wanted, seconds, np.unwrap(turn))
+        known, place, turn = map(np.concatenate, zip(*self.transforms[child], strict=True))
+        order = np.argsort(known, kind="stable")
+        seconds = (known[order] - known[order[0]]) * 1e-9
+        wanted = (stamps - known[order[0]]) * 1e-9
+        origin = np.interp(wanted, seconds, place[order])
+        return np.asarray(origin), np.interp(wanted, seconds, np.unwrap(turn[order]))
 
-    def tie(self, parent: str, child: str, in_parent: Rows, in_child: Rows) -> None:
+    def tie(
+        self, parent: str, child: str, in_parent: Observations, in_child: Observations
+    ) -> None:
         """Add the transforms that two recordings of one vehicle in two frames show."""
         of_child = FrameTree()
-        for fix in in_child.fixes:
-            of_child.add("frame", "body", fix.stamp_ns, fix.x, fix.y, fix.heading)
-        first, last = in_child.fixes[0].stamp_ns, in_child.fixes[-1].stamp_ns
-        common = [fix for fix in in_parent.fixes if first <= fix.stamp_ns <= last]
-        if not common:
-            return
-        stamps = np.array([fix.stamp_ns for fix in common], dtype=np.int64)
-        body, body_heading = of_child._transforms_at("body", stamps)
-        place, heading = _poses(common)
-        turn = wrap_angle(heading - body_heading)
-        origin = place - np.exp(1j * turn) * body
-        for fix, point, angle in zip(common, origin.tolist(), turn.tolist(), strict=True):
-            self.add(parent, child, fix.stamp_ns, point.real, point.imag, angle)
+        of_child.add("frame", "body", in_child.fix_ns, _place(in_child), in_child.heading)
+        stamps = in_parent.fix_ns
+        common = (stamps >= in_child.fix_ns[0]) & (stamps <= in_child.fix_ns[-1])
+        if common.any():
+            body, body_heading = of_child._transforms_at("body", stamps[common])
+            turn = wrap_angle(in_parent.heading[common] - body_heading)
+            origin = _place(in_parent)[common] - np.exp(1j * turn) * body
+            self.add(parent, child, stamps[common], origin, turn)
 
 
-def _poses(fixes: Sequence[Fix]) -> tuple[Complexes, Floats]:
-    """Return places (F,) [m], x + iy, and headings (F,)."""
-    place = np.array([complex(fix.x, fix.y) for fix in fixes], dtype=complex)
-    return place, np.array([fix.heading for fix in fixes], dtype=float)
+def _place(observed: Observations) -> Complexes:
+    """Return positions (F,) [m] as x + iy."""
+    return np.asarray(observed.fix[:, 0] + 1j * observed.fix[:, 1])
 
 
-def _at_places(fixes: Sequence[Fix], place: Complexes, heading: Floats) -> list[Fix]:
-    """Return the fixes at other places (F,) with other headings (F,)."""
-    poses = zip(fixes, place.tolist(), heading.tolist(), strict=True)
-    return [fix._replace(x=z.real, y=z.imag, heading=yaw) for fix, z, yaw in poses]
+def _moved(observed: Observations, place: Complexes, heading: Floats) -> Observations:
+    """Return a vehicle at other positions (F,) [m], x + iy, with other headings (F,)."""
+    return replace(observed, fix=np.column_stack((place.real, place.imag)), heading=heading)
 
 
 def in_one_frame(
@@ -223,22 +203,23 @@ def in_one_frame(
     used: list[Recording] = []
     notes: list[str] = []
     for group in by_vehicle(recordings).values():
-        places = sorted((each for each in group if each.rows.fixes), key=_density, reverse=True)
-        used += [*(each for each in group if not each.rows.fixes), *places[:1]]
+        places = sorted((each for each in group if each.has_fixes), key=_density, reverse=True)
+        used += [*(each for each in group if not each.has_fixes), *places[:1]]
         notes += [_tied(places[0], other, tree) for other in places[1:]]
     centres = {parent: child for child, parent in tree.parents.items() if "cent" in _last(child)}
     for recording in used:
         notes += _centred(recording, centres, tree)
-        if recording.frame and recording.rows.fixes:
+        if recording.frame and recording.has_fixes:
             _move_to_root(label, recording, tree)
-    return used, notes, _frame_doubts({r.vehicle: r.frame for r in used if r.rows.fixes})
+    return used, notes, _frame_doubts({r.vehicle: r.frame for r in used if r.has_fixes})
 
 
 def _tied(best: Recording, other: Recording, tree: FrameTree) -> str:
     """Tie the frames of two recordings of one vehicle, if nothing does; return a note."""
     if best.frame and other.frame and tree.root(best.frame) != tree.root(other.frame):
         parent, child = tree.root(other.frame), tree.root(best.frame)
-        tree.tie(parent, child, _rooted(other, tree), _rooted(best, tree))
+        in_parent = tree.in_root(other.frame, other.observed)
+        tree.tie(parent, child, in_parent, tree.in_root(best.frame, best.observed))
         return f"vehicle {best.vehicle}: {other.topic} places {best.topic} in {other.frame!r}"
     return f"vehicle {best.vehicle} is read from {best.topic}, not {other.topic}"
 
@@ -253,13 +234,12 @@ def _centred(recording: Recording, centres: Mapping[str, str], tree: FrameTree) 
     """
     child = recording.child.strip("/")
     if child in centres:
-        ahead, left = tree.transforms[centres[child]][0][1:3]
-        place, heading = _poses(recording.rows.fixes)
-        place = place + np.exp(1j * heading) * complex(ahead, left)
-        recording.rows.fixes = _at_places(recording.rows.fixes, place, heading)
-        recording.ahead = 0.0
+        centre = tree.transforms[centres[child]][0][1][0]
+        heading = recording.observed.heading
+        place = _place(recording.observed) + np.exp(1j * heading) * centre
+        recording.observed = replace(_moved(recording.observed, place, heading), ahead=0.0)
     elif "rear_axle" in child:
-        recording.ahead = POINTS["rear_axle"]
+        recording.observed = replace(recording.observed, ahead=POINTS["rear_axle"])
         return [f"vehicle {recording.vehicle}: positions are those of its rear axle"]
     return []
 
@@ -270,7 +250,7 @@ def _move_to_root(label: str, recording: Recording, tree: FrameTree) -> None:
     Raises:
         InputError: the root moves with its vehicle.
     """
-    recording.rows = _rooted(recording, tree)
+    recording.observed = tree.in_root(recording.frame, recording.observed)
     recording.frame = tree.root(recording.frame)
     if _last(recording.frame).startswith("base_"):
         raise InputError(
@@ -281,11 +261,7 @@ def _move_to_root(label: str, recording: Recording, tree: FrameTree) -> None:
 
 
 def _density(recording: Recording) -> int:
-    return len(recording.rows.fixes)
-
-
-def _rooted(recording: Recording, tree: FrameTree) -> Rows:
-    return Rows(tree.in_root(recording.frame, recording.rows.fixes), recording.rows.speeds)
+    return len(recording.observed.fix_ns)
 
 
 def _frame_doubts(frames: Mapping[str, str]) -> list[Doubt]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
-from pyarrow import compute, parquet
+from pyarrow import parquet
 
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.column import Column
@@ -31,90 +31,51 @@ def read_columns(
     Raises:
         InputError: the file is damaged or too large, or a column does not suit its quantity.
     """
-    schema = _read_schema(path)
+    problem = f"{path} cannot be read as a Parquet table"
+    with guarded(problem):
+        schema = parquet.read_schema(path)
+        # Texts as dictionaries: repeated ones are stored once.
+        texts = [field.name for field in schema if _is_text(field.type)]
+        file = parquet.ParquetFile(path, read_dictionary=texts)
     header = list(schema.names)
-    columns = find_columns(header, path, config.columns)
+    if repeated := [name for name, count in Counter(header).items() if count > 1]:
+        raise InputError(f"{path} has several columns {repeated[0]!r}; rename all but one")
+    columns = _typed(find_columns(header, path, config.columns), schema, path)
+    names = sorted({column.name for column in columns.values()})
+    metadata = file.metadata
+    check_size(
+        str(path), _declared_bytes(metadata, names), rows_before + metadata.num_rows, config
+    )
+    with guarded(problem):
+        table = file.read(names, use_threads=False)
+    check_size(str(path), table.nbytes, rows_before + table.num_rows, config)
+    if not table.num_rows:
+        raise InputError(f"{path} has a header but no rows")
+    with guarded(problem):
+        frame = pd.DataFrame({name: _to_series(table.column(name)) for name in names})
+    return frame, columns, header
+
+
+def _typed(columns: dict[str, Column], schema: pa.Schema, path: Path) -> dict[str, Column]:
+    """Return the columns without those of unknown meaning; times have the unit of their type.
+
+    Raises:
+        InputError: a column does not suit its quantity.
+    """
     for quantity, column in list(columns.items()):
         kind = _value_type(schema.field(column.name).type)
         if quantity in ("kind", "date") and not (_is_text(kind) or column.types):
             del columns[quantity]  # numbers of unknown meaning, or whole days
             continue
-        unit_s = _time_unit_s(kind)
-        is_time = quantity == "time" and unit_s is not None
-        if not (is_time or _is_text(kind) or _is_number(kind)):
+        unit_s = _time_unit_s(kind) if quantity == "time" else None
+        if unit_s is not None:
+            columns[quantity] = replace(column, factor=unit_s)
+        elif not (_is_text(kind) or _is_number(kind)):
             raise InputError(
                 f"{path}, column {column.name!r} ({quantity}): a {kind} is not a {quantity}; "
                 "name another column"
             )
-        if quantity == "time" and unit_s is not None:
-            columns[quantity] = replace(column, factor=unit_s)
-    names = sorted({column.name for column in columns.values()})
-    return _read_table(path, names, rows_before, config), columns, header
-
-
-def _read_schema(path: Path) -> pa.Schema:
-    """Return the names and types of the columns.
-
-    Raises:
-        InputError: the file is damaged, or two columns have the same name.
-    """
-    with guarded(f"{path} cannot be read as a Parquet table"):
-        schema = parquet.read_schema(path)
-        counts = Counter(schema.names)
-    for name, count in counts.items():
-        if count > 1:
-            raise InputError(f"{path} has several columns {name!r}; rename all but one")
-    return schema
-
-
-def _read_table(
-    path: Path, names: Sequence[str], rows_before: int, config: LogConfig
-) -> pd.DataFrame:
-    """Read some columns unchanged; missing ones are omitted.
-
-    Raises:
-        InputError: the file is damaged or too large.
-    """
-    schema = _read_schema(path)
-    present = [name for name in names if name in schema.names]
-    batches = _read_batches(path, schema, present, rows_before, config)
-    frame = {}
-    for name in present:
-        with guarded(f"{path}, column {name!r} cannot be read"):
-            frame[name] = _to_series(pa.chunked_array([batch.column(name) for batch in batches]))
-    return pd.DataFrame(frame)
-
-
-def _read_batches(
-    path: Path, schema: pa.Schema, names: Sequence[str], rows_before: int, config: LogConfig
-) -> list[Any]:
-    """Read some columns in batches; texts as dictionaries, so that repeated ones are stored once.
-
-    Raises:
-        InputError: the file is damaged or too large.
-    """
-    texts = [name for name in names if _is_text(schema.field(name).type)]
-    with guarded(f"{path} cannot be read as a Parquet table"):
-        file = parquet.ParquetFile(path, read_dictionary=texts)
-        declared_bytes = _declared_bytes(file.metadata, names)
-        declared_rows = file.metadata.num_rows
-        source = file.iter_batches(1 << 16, columns=list(names), use_threads=False)
-    check_size(str(path), declared_bytes, rows_before + declared_rows, config)
-    batches: list[Any] = []
-    n_rows = 0
-    n_bytes = 0
-    while True:
-        with guarded(f"{path} cannot be read as a Parquet table, after row {n_rows}"):
-            batch = next(source, None)
-            if batch is None:
-                break
-            n_rows += batch.num_rows
-            n_bytes += sum(map(_decoded_bytes, batch.columns))
-        check_size(str(path), n_bytes, rows_before + n_rows, config)
-        batches.append(batch)
-    if not n_rows:
-        raise InputError(f"{path} has a header but no rows")
-    return batches
+    return columns
 
 
 def _declared_bytes(metadata: Any, names: Sequence[str]) -> int:
@@ -126,14 +87,6 @@ def _declared_bytes(metadata: Any, names: Sequence[str]) -> int:
             if column.path_in_schema.split(".")[0] in names:
                 total += max(column.total_uncompressed_size, 0)
     return total
-
-
-def _decoded_bytes(values: pa.Array) -> int:
-    """Return the size of values; texts in a dictionary count as often as they occur."""
-    if not pa.types.is_dictionary(values.type) or not _is_text(values.type.value_type):
-        return int(values.nbytes)
-    lengths = compute.binary_length(values.dictionary).take(values.indices)
-    return compute.sum(lengths.cast(pa.int64())).as_py() or 0
 
 
 def _value_type(kind: pa.DataType) -> pa.DataType:

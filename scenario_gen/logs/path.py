@@ -350,31 +350,34 @@ class Motion:
         self.prior = np.zeros((4, self.size + 3))
         no_target = np.zeros(len(weight))
         observe(self.prior, np.zeros(self.size + 3), start, third, 1, weight, no_target)
-        self.constraints, self.bounds = self._limits(config)
+        self.highest = config.acceleration_limit
+        self.lowest = -config.braking_limit
 
-    def _limits(self, config: LogConfig) -> tuple[Any, Floats]:
+    def _is_within_limits(self, variables: Floats) -> bool:
+        """Return whether variables (V,) keep the limits of speed and acceleration."""
+        coefficients = variables[self.variable]
+        acceleration = np.diff(coefficients, 2) / self.dt**2
+        is_forwards = (np.diff(coefficients) >= 0.0).all()
+        return bool(
+            is_forwards
+            and acceleration.max(initial=0.0) <= self.highest
+            and acceleration.min(initial=0.0) >= self.lowest
+        )
+
+    def _limits(self) -> tuple[Any, Floats]:
         """Return the matrix and right side of the limits: speed, acceleration, deceleration."""
-        speed_start, first = self._differences(1)
-        start, second = self._differences(2)
-        speed = first * (1.0 / self.dt)
-        acceleration = second * (1.0 / np.square(self.dt))
-        blocks = ((speed_start, -speed), (start, acceleration), (start, -acceleration))
-        counts = [len(block_start) for block_start, _ in blocks]
-        limits = [0.0, config.acceleration_limit, config.braking_limit]
-        row_starts = np.cumsum([0, *counts])
-        rows = [
-            np.repeat(row_start + np.arange(len(values)), values.shape[1])
-            for row_start, (_, values) in zip(row_starts, blocks, strict=False)
-        ]
-        columns = [
-            (block_start[:, None] + np.arange(values.shape[1])).ravel()
-            for block_start, values in blocks
-        ]
-        entries = np.concatenate([values.ravel() for _, values in blocks])
-        used = entries != 0.0  # merged variables leave the last entries of a row empty
-        indices = (np.concatenate(rows)[used], np.concatenate(columns)[used])
-        shape = (row_starts[-1], self.size)
-        return sparse.csc_array((entries[used], indices), shape), np.repeat(limits, counts)
+        n = len(self.variable)
+        merge = sparse.csc_array((np.ones(n), (np.arange(n), self.variable)))
+        stencils = [np.full((order + 1, n), differences(n, order)[0][:, None]) for order in (1, 2)]
+        speed, acceleration = (
+            sparse.dia_array((stencil, np.arange(order + 1)), (n - order, n)) @ merge
+            for order, stencil in enumerate(stencils, 1)
+        )
+        blocks = (-speed / self.dt, acceleration / self.dt**2, -acceleration / self.dt**2)
+        rows = sparse.vstack(blocks).tocsc()
+        rows.eliminate_zeros()
+        limits = [0.0, self.highest, -self.lowest]
+        return rows, np.repeat(limits, [n - 1, n - 2, n - 2])
 
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
         """Return rows (F, E) over coefficients from `tick` (F,) on as rows over variables.
@@ -442,20 +445,19 @@ class Motion:
         """
         with suppress(np.linalg.LinAlgError):
             free = np.asarray(linalg.solveh_banded(quadratic, linear, lower=True))
-            if (self.constraints @ free <= self.bounds).all():
+            if self._is_within_limits(free):
                 return free
+        constraints, bounds = self._limits()
         shape = (self.size, self.size)
         lower = sparse.dia_array((quadratic, -np.arange(4)), shape)
         upper = lower.T.tocsc()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
-        cones = [clarabel.NonnegativeConeT(len(self.bounds))]
+        cones = [clarabel.NonnegativeConeT(len(bounds))]
         for equilibrate in (True, False):  # scaling worsens the matrix if fixes are seconds apart
             settings.equilibrate_enable = equilibrate
-            solver = clarabel.DefaultSolver(
-                upper, -linear, self.constraints, self.bounds, cones, settings
-            )
+            solver = clarabel.DefaultSolver(upper, -linear, constraints, bounds, cones, settings)
             solution = solver.solve()
             if solution.status in (
                 clarabel.SolverStatus.Solved,

@@ -6,19 +6,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-import logging
 from pathlib import Path
 from typing import Any, overload, TYPE_CHECKING
 
 from scenario_gen.base.copies import naming_inputs, temp_folder
-from scenario_gen.base.errors import InputError, printable, reading
+from scenario_gen.base.errors import InputError, reading
 from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.parameters import updated
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops, newest_last
 from scenario_gen.logs.clock import retimed
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
-from scenario_gen.logs.encounters import Piece, pieces_of, plausible
+from scenario_gen.logs.encounters import cut_track, Piece, pieces_of, plausible
 from scenario_gen.logs.evidence import interpret
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
 from scenario_gen.logs.files import logs_in, read_raw
@@ -42,8 +41,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _DATAFRAME_FILE = "dataframe.csv"
-_MANY_TICK_COUNT = 30_000  # the user is told that smoothing takes long
-_TICK_S = 8e-5  # of one tick
 _MANY_DROPS_SHARE = 0.02  # of the rows; the user is told at once
 
 
@@ -372,20 +369,13 @@ def _smooth_pieces(
     """
     pieces: list[Piece] = []
     vehicles = []
-    raw = [pieces_of(track, origin_ns, config, smooth=False) for track in tracks]
+    cut = [cut_track(track, origin_ns, config) for track in tracks]
+    raw = [pieces_of(each, origin_ns, config, smooth=False) for each in cut]
     raw_pieces = list(chain.from_iterable(track_pieces for track_pieces, _ in raw))
     near = vehicles_near(raw_pieces, config)
-    n_ticks = sum(piece.last - piece.first for piece in raw_pieces if piece.track.id in near)
-    if n_ticks > _MANY_TICK_COUNT:
-        logging.getLogger("scenario_gen").warning(
-            "%s: %d vehicles come near others and are smoothed; this takes %.0f s or more",
-            printable(log.name),
-            len(near),
-            n_ticks * _TICK_S,
-        )
-    for track, unsmoothed in zip(tracks, raw, strict=True):
-        is_near = track.id in near
-        track_pieces, quality = pieces_of(track, origin_ns, config) if is_near else unsmoothed
+    for each, unsmoothed in zip(cut, raw, strict=True):
+        is_near = each.track.id in near
+        track_pieces, quality = pieces_of(each, origin_ns, config) if is_near else unsmoothed
         pieces += track_pieces
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):

@@ -156,7 +156,10 @@ class _Fit(NamedTuple):
 
 
 def interpolated_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
-    """Return a piece on the clock as it was recorded; arguments as in `smooth_piece`."""
+    """Return a piece on the clock as it was recorded; None if it has fewer than three ticks.
+
+    Arguments as in `smooth_piece`.
+    """
     dt = config.period
     fix_t = _seconds(piece.fix_ns, origin_ns)
     first = int(np.ceil(fix_t[0] / dt - 1e-6))
@@ -195,23 +198,18 @@ def _seconds(stamps: Ints, origin_ns: int) -> Floats:
     return (stamps - origin_ns).astype(np.float64) * 1e-9
 
 
-def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
+def smooth_piece(piece: Observations, raw: Smooth, origin_ns: int, config: LogConfig) -> Smooth:
     """Fit path and motion to a piece of a track.
 
     Args:
         piece: its fixes and speeds.
+        raw: the piece on the clock, as recorded.
         origin_ns: stamp of tick 0 of the common clock.
         config: names period, noise and limits.
-
-    Returns:
-        The piece on the clock, or None if it has fewer than three ticks.
 
     Raises:
         UnreconciledError: no motion of a car fits.
     """
-    raw = interpolated_piece(piece, origin_ns, config)
-    if raw is None:
-        return None
     dt = config.period
     ticks = dt * np.arange(len(raw.speed), dtype=np.float64)
     fix_t = _seconds(piece.fix_ns, origin_ns) - raw.first * dt

@@ -108,7 +108,7 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
                             {"type": other.type},
                             *[{"data": content}] * 4,
                         )
-                        message = replace(message, **rng.choice(changes))  # noqa: PLW2901
+                        message = message._replace(**rng.choice(changes))  # noqa: PLW2901
                     bag.add_topic(message.topic, message.type)
                     bag.write(message.topic, message.data, message.stamp_ns)
             return (folder / "out" / "out_0.mcap").read_bytes()

@@ -12,10 +12,15 @@ import pytest
 from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
-from scenario_gen.logs.encounters import pieces_of
+from scenario_gen.logs.encounters import cut_track, pieces_of
 from scenario_gen.logs.path import fit_path, headings_of, Motion, straight_path
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import smooth_piece, standing, white_equivalent
+from scenario_gen.logs.smoothing import (
+    interpolated_piece,
+    smooth_piece,
+    standing,
+    white_equivalent,
+)
 
 CONFIG = LogConfig()
 
@@ -103,10 +108,14 @@ def drive(speed, noise, seed=0, rate=10.0, sensor=1.0):
     )
 
 
+def smoothed(track):
+    return smooth_piece(track, interpolated_piece(track, 0, CONFIG), 0, CONFIG)
+
+
 def test_standing_is_still_and_keeps_its_heading():
     speed = np.interp(np.arange(0.0, 20.0, 0.1), [0, 5, 8, 13, 18], [8.0, 8.0, 0.0, 0.0, 6.0])
     place, track = drive(speed, noise=0.3)
-    smooth = smooth_piece(track, 0, CONFIG)
+    smooth = smoothed(track)
     still = (smooth.speed == 0.0).nonzero()[0]
     assert abs(still[0] - 80) <= 4 and abs(still[-1] - 130) <= 4
     assert np.ptp(smooth.position[still], axis=0).max() < 1e-9
@@ -118,7 +127,7 @@ def test_standing_is_still_and_keeps_its_heading():
 def test_a_sensor_that_is_off_by_three_percent_does_not_lengthen_the_way():
     speed = np.full(400, 12.0)
     place, track = drive(speed, noise=0.2, sensor=1.03)
-    smooth = smooth_piece(track, 0, CONFIG)
+    smooth = smoothed(track)
     assert np.abs(smooth.position[:, 0] - place).max() < 0.5
     assert smooth.speed.mean() == pytest.approx(12.0, abs=0.1)
 
@@ -129,7 +138,7 @@ def test_a_stuck_speed_sensor_does_not_stop_the_car():
     assert not standing(
         0.1 * np.arange(100), track.fix_ns * 1e-9, track.fix, track.speed_ns * 1e-9, track.speed
     ).any()
-    smooth = smooth_piece(track, 0, CONFIG)
+    smooth = smoothed(track)
     assert np.abs(smooth.position[:, 0] - place).max() < 1.5
 
 
@@ -145,7 +154,7 @@ def test_noise_of_the_fixes_is_no_lateral_acceleration():
     """A straight drive at 15 m/s with 0.3 m of noise: before, the path followed it with several m/s²."""
     speed = np.full(150, 15.0)
     _, track = drive(speed, noise=0.3, seed=2)
-    smooth = smooth_piece(track, 0, CONFIG)
+    smooth = smoothed(track)
     assert np.abs(np.diff(smooth.heading) / 0.1 * smooth.speed[1:]).max() < 0.8
     assert 0.2 < smooth.noise < 0.4
     assert np.sqrt(np.square(smooth.moved).mean()) < 0.3 * np.sqrt(2.0) * 1.1
@@ -168,8 +177,8 @@ def turning(noise, heading_noise):
 
 def test_recorded_headings_are_used_where_a_car_is_slow():
     _, course, track = turning(1.0, np.radians(1.0))
-    with_them = smooth_piece(track, 0, CONFIG)
-    without = smooth_piece(replace(track, heading=np.full(120, np.nan)), 0, CONFIG)
+    with_them = smoothed(track)
+    without = smoothed(replace(track, heading=np.full(120, np.nan)))
     off = [
         np.sqrt(np.square(np.degrees(smooth.heading - course)).mean())
         for smooth in (with_them, without)
@@ -184,7 +193,7 @@ def test_headings_that_are_none_have_no_say(wrong):
     """A default, or one that is always far off; and one that jumps about while the car stands."""
     _, course, track = turning(0.1, 0.0)
     heading = np.full(120, wrong) if wrong else np.where(np.arange(120) < 10, -1.5, course)
-    smooth = smooth_piece(replace(track, heading=heading), 0, CONFIG)
+    smooth = smoothed(replace(track, heading=heading))
     assert np.degrees(np.abs(smooth.heading - course)).max() < 8.0
 
 
@@ -202,7 +211,8 @@ def test_who_reverses_in_a_short_stop_is_cut_there():
     speed = np.abs(np.gradient(along, 0.1))
     _, track = drive(speed, noise=0.0)
     aside = np.where(np.arange(205) < 105, 0.0, 0.05 * (np.arange(205) - 105))
-    pieces, quality = pieces_of(replace(track, fix=np.column_stack((along, aside))), 0, CONFIG)
+    track = replace(track, fix=np.column_stack((along, aside)))
+    pieces, quality = pieces_of(cut_track(track, 0, CONFIG), 0, CONFIG)
     assert quality.reversals >= 1
     for piece in pieces:
         steps = np.hypot(*np.diff(piece.smooth.position, axis=0).T)

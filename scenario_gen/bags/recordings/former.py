@@ -63,7 +63,7 @@ def upgraded(messages: Messages, statuses: Statuses) -> Messages:
                 data[PLAN] = _plan(named, statuses, data[LANES])
             for name, document in data.items():
                 place = f"{info.topic.removesuffix(topic)}{name}"
-                upgrade = replace(info, topic=place, type=documents.TYPE, data=document)
+                upgrade = info._replace(topic=place, type=documents.TYPE, data=document)
                 documents_by_topic[name].append(upgrade)
     return {**messages, **documents_by_topic}
 
@@ -73,7 +73,7 @@ def _upgraded_info(message: BagMessage) -> BagMessage:
     if message.type == diagnostics.TYPE:
         with suppress(InputError):
             data = upgraded_info(message.data)
-            return replace(message, type=documents.TYPE, data=data)
+            return message._replace(type=documents.TYPE, data=data)
     return message
 
 

@@ -291,9 +291,9 @@ class Namespace(RecordedScenarios):
         message = messages[entry.sha256]
         parts = [message]
         if entry.messages:
-            parts = [replace(message, data=data) for data in messages_of(message.data)]
+            parts = [message._replace(data=data) for data in messages_of(message.data)]
         witness = [self.witnesses[entry.witness]] if entry.witness else []
-        closing = replace(info, data=encode_info(summary.of_one_scenario()))
+        closing = info._replace(data=encode_info(summary.of_one_scenario()))
         inputs = self.template_messages(entry, entry.stamp).values()
         return (*inputs, *witness, *parts, info, closing)
 

@@ -293,7 +293,7 @@ def joined_messages(
             data = b"".join(messages[k].data for k in parts)
             for k in parts:
                 joined.pop(k)
-            joined[parts[0]] = replace(messages[parts[0]], data=data)
+            joined[parts[0]] = messages[parts[0]]._replace(data=data)
     return [joined[k] for k in sorted(joined)]
 
 

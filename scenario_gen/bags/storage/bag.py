@@ -21,6 +21,7 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 
 _FRAME_HEADER_BYTES = 18
+_STAMP = attrgetter("stamp_ns")
 
 
 def _within(
@@ -98,7 +99,7 @@ class StoredBag:
                 topic is not CDR of a known type.
         """
         streams = [self._messages_of_file(path, file, wanted) for path, file in self.files]
-        merged: Iterator[BagMessage] = heapq.merge(*streams, key=attrgetter("stamp_ns"))
+        merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=_STAMP)
         if within_ns:
             offered = (topic for topic in self.topics() if wanted(topic.name, topic.type))
             merged = _within(merged, within_ns, {topic.name for topic in offered if topic.count})

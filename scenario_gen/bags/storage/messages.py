@@ -5,13 +5,12 @@
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from scenario_gen.types import Quality
 
 
-@dataclass(frozen=True)
-class BagMessage:
+class BagMessage(NamedTuple):
     """A message of a bag: CDR bytes, and the time at which it was logged."""
 
     topic: str
