@@ -41,6 +41,7 @@ class EvidenceLimits:
         min_leg_m: shorter displacements have no direction.
         max_speed_mps: of road vehicles.
         degrees_m: where no vehicle drives farther, x and y may be degrees.
+        max_reverse_mps: no vehicle drives backwards faster.
         standing_m: no vehicle that drives stays within it.
         max_crawl_mps: where no vehicle is faster, whole numbers may be frames.
         min_crawl_m: distance that such a vehicle drives.
@@ -67,6 +68,7 @@ class EvidenceLimits:
     min_leg_m: float = 1.0
     max_speed_mps: float = 70.0
     degrees_m: float = 0.05
+    max_reverse_mps: float = 5.0
     standing_m: float = 1.0
     max_crawl_mps: float = 3.0
     min_crawl_m: float = 20.0

@@ -55,10 +55,30 @@ def check_directions(reading: Reading) -> None:
         "travel"
     )
     changes = _agreeing_changes(reading, quantity)
+    names_off = _vehicles_off(reading, compared, f"{quantity}_off")
     if changes:
         reading.resolve(Quantity.FRAME, share, fact, changes)
+    elif names_off and reading.has(quantity):
+        cause = f"{fact}, nearly all of vehicles {names_off}; others agree"
+        reading.doubt(Quantity.FRAME, share, cause, reading.option(**{quantity: "none"}))
     else:
         reading.notes.append(f"{fact}; {names[quantity]} that contradict it are not used")
+
+
+def _vehicles_off(reading: Reading, compared: Comparison, name: str) -> str:
+    """Return the vehicles that nothing but a direction contradicts, and too fast to reverse.
+
+    None if few are so, if no vehicle agrees, or if all headings are one default value.
+    """
+    headings = np.unique(np.concatenate([vehicle.heading for vehicle in reading.tried()]))
+    if name == "heading_off" and np.isfinite(headings).sum() < 2:
+        return ""
+    shares = getattr(compared, name)
+    is_off = (shares > EVIDENCE.agreeing_share) & (compared.fastest > EVIDENCE.max_reverse_mps)
+    n_known = np.isfinite(shares).sum()
+    if is_off.sum() <= EVIDENCE.many_share * n_known or not (shares < EVIDENCE.off_share).any():
+        return ""
+    return ", ".join(v.id for v, off in zip(reading.tried(), is_off, strict=True) if off)
 
 
 def _agreeing_changes(reading: Reading, quantity: str) -> list[Change]:

@@ -381,14 +381,16 @@ def _doubt_speeds(reading: Reading, compared: Comparison) -> None:
         parts = [f"{r:.2f} times for vehicle {n}" for n, r in zip(names, ratios, strict=True)]
         fact = f"the recorded speeds over those of the positions differ: {', '.join(parts)}"
     cause = f"{fact}: check the units of time, positions and speeds"
-    if np.ptp(ratios) < 0.1 * ratio and np.nanmedian(compared.spread) < np.log(1.1):
-        scales = list(_scales(reading, ratio))
-        if len(scales) > 1:
-            reading.resolve(Quantity.SPEED, ratio, fact, scales)
-            return
+    scales = list(_scales(reading, ratio))
+    is_fixed = np.ptp(ratios) < 0.1 * ratio and np.nanmedian(compared.spread) < np.log(1.1)
+    if is_fixed and len(scales) > 1:
+        reading.resolve(Quantity.SPEED, ratio, fact, scales)
+        return
     remedy = "convert the rows that differ" if len(names) > 1 and reading.log.columns else ""
-    is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
-    is_serious = is_gross.mean() > EVIDENCE.many_share and bool(reading.log.columns)
+    is_steady = compared.spread[is_known] < np.log(1.1)
+    is_scaled = is_steady & (compared.deviation[is_known] > EVIDENCE.wrong_ratio)
+    is_bad = is_scaled | (compared.gross_off[is_known] > EVIDENCE.gross_share)
+    is_serious = is_bad.mean() > EVIDENCE.many_share and bool(reading.log.columns)
     reading.doubt(Quantity.SPEED, ratio, cause, remedy, stops=bool(is_serious))
 
 

@@ -257,6 +257,14 @@ STOPPED = {  # what no option reads right, and what is said
         ROWS.assign(h=-np.degrees(ROWS.h)),
         "y=-y,heading=heading:deg .*heading=-heading:deg",
     ),
+    "headings of one vehicle": (
+        ROWS.assign(h=ROWS.h.where(ROWS.id == "A", ROWS.h + 2.0)),
+        "nearly all of vehicles B; others agree; .*heading=none",
+    ),
+    "a slow clock of one vehicle": (
+        ROWS.assign(t=START_S + (ROWS.t - START_S) * np.where(ROWS.id == "A", 1.0, 1.3)),
+        "1.00 times for vehicle A, 1.30 times for vehicle B",
+    ),
     "a bridge": (ROWS.assign(z=np.where(ROWS.id == "A", 300.0, 308.5)), "8.5 m apart in height"),
 }
 
