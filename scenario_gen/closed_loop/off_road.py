@@ -8,6 +8,8 @@ if it reports an exit, the depth is measured, at poses so close together that no
 footprint moves more than POSE_SPACING_M from one to the next.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 import math
 from typing import Any, NamedTuple
 
@@ -17,10 +19,11 @@ from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import edge_lengths, place
+from scenario_gen.numerics.polygons import distance_field
 from scenario_gen.roads import footprint_fits, to_cells, to_metres
 from scenario_gen.types import Motion, Obstacle, Road
 from scenario_gen.types.road import MAX_DEPTH_M
@@ -28,6 +31,7 @@ from scenario_gen.types.road import MAX_DEPTH_M
 POSE_SPACING_M = 0.05
 POINTS_COUNT = (25, 11)  # along and across a footprint, of which the deepest is found
 DEPTH_ERROR_M = 0.01
+_ROUNDING_M = 1e-6  # of depths, so that it leaves out no point
 SUBSTEPS_COUNT = 200  # per step, to locate the beginning of an event
 RESOLUTION_S = 1e-6  # an event that cannot be excluded over such an interval counts
 
@@ -63,26 +67,24 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
         motion.time, control, motion.heading, np.array([half]), Ground.of(road), RESOLUTION_S, out
     )
     if out[0, 0] == Proof.PROVEN:
-        edge = _pavement(road, motion.poses[0], half).boundary
+        edge = _Ground.around(road, motion.poses[0], half).pavement.boundary
         room = shapely.distance(_footprints(motion.poses[0], half), edge).min()
         return RoadUse(float(np.clip(room, RESOLUTION_S, MAX_DEPTH_M)), 0.0, math.nan)
-    depths = _depths(road, motion.poses[0], half)
-    is_out = (depths >= limit) & (depths > 0.0)
+    is_out = _Ground.around(road, motion.poses[0], half).is_out(motion.poses[0], half, limit)
     first_out = motion.time[np.argmax(is_out)] if is_out.any() else motion.time[-1]
     time = _fine_times(motion)  # from then on the samples suffice
     time = np.union1d(time[time <= first_out], motion.time)
     poses = motion.at(time).poses[0]
-    depths = _depths(road, poses, half)
-    reached = (depths >= limit) & (depths > 0.0)
+    ground = _Ground.around(road, poses, half)
+    reached = ground.is_out(poses, half, limit)
     begin = math.nan
     if reached.any():
         k = int(np.argmax(reached))
         between = np.linspace(time[max(k - 1, 0)], time[k], SUBSTEPS_COUNT + 1)
-        fine = _depths(road, motion.at(between).poses[0], half)
-        begin = float(between[np.argmax((fine >= limit) & (fine > 0.0))])
-    pavement = _pavement(road, poses, half)
-    area = shapely.area(shapely.difference(_footprints(poses, half), pavement)).max()
-    return RoadUse(-_depth(road, poses[np.argmax(depths)], half), float(area), begin)
+        begin = float(between[np.argmax(ground.is_out(motion.at(between).poses[0], half, limit))])
+    area = shapely.area(shapely.difference(_footprints(poses, half), ground.pavement)).max()
+    deepest = poses[np.argmax(ground.greatest_depths(poses, _grid(half)).max(axis=1))]
+    return RoadUse(-_depth(road, deepest, half), float(area), begin)
 
 
 def first_obstacle(drive: Drive, road: Road | None) -> tuple[float, Obstacle] | None:
@@ -125,26 +127,16 @@ def _fine_times(motion: Motion) -> Floats:
     return np.asarray(np.interp(place_in_steps, np.arange(steps + 1), motion.time))
 
 
-def _depths(road: Road, poses: Floats, half: tuple[float, float]) -> Floats:
-    """Return (P,) the depth [m] outside the road of some points of a footprint, 0 inside."""
-    outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
-    depths = np.zeros(len(poses))
-    if outside.any():
-        pavement = _pavement(road, poses[outside], half)
-        depths[outside] = _outside(pavement, poses[outside], _grid(half)).max(axis=1)
-    return depths
-
-
 def _depth(road: Road, pose: Floats, half: tuple[float, float]) -> float:
     """Return the greatest depth [m] of a footprint at a pose (3,) outside the road, to 1 cm."""
-    pavement = _pavement(road, pose[None], half)
+    ground = _Ground.around(road, pose[None], half)
     points = _grid(half)
     spacing = 2.0 * max(half) / (min(POINTS_COUNT) - 1)
     while spacing > DEPTH_ERROR_M:
-        deepest = points[np.argmax(_outside(pavement, pose[None], points))]
+        deepest = points[np.argmax(ground.greatest_depths(pose[None], points))]
         spacing /= 4.0
         points = np.clip(deepest + spacing * _grid((4.0, 4.0)), np.negative(half), half)
-    return float(_outside(pavement, pose[None], points).max())
+    return float(ground.greatest_depths(pose[None], points).max())
 
 
 def _grid(half: tuple[float, float]) -> Floats:
@@ -153,28 +145,94 @@ def _grid(half: tuple[float, float]) -> Floats:
     return np.stack(np.meshgrid(along, across), axis=-1).reshape(-1, 2)
 
 
-def _outside(pavement: BaseGeometry, poses: Floats, points: Floats) -> Floats:
-    """Return (P, M) how far [m] points (M, 2) of a footprint at poses (P, 3) are outside."""
-    shapely.prepare(pavement)
-    distance = shapely.distance(shapely.points(place(poses[:, None], *points.T)), pavement)
-    return np.asarray(np.nan_to_num(distance, nan=MAX_DEPTH_M).clip(max=MAX_DEPTH_M))
-
-
 def _footprints(poses: Floats, half: tuple[float, float]) -> Any:
     """Return the footprints (P,) at poses (P, 3) as polygons."""
     return shapely.polygons(corners(poses, 2.0 * half[0], 2.0 * half[1]))
 
 
-def _pavement(road: Road, poses: Floats, half: tuple[float, float]) -> BaseGeometry:
-    """Return the drivable area, as far as it matters for a footprint at poses (P, 3)."""
-    reach = MAX_DEPTH_M + math.hypot(*half)
-    low, high = (
-        np.clip(np.floor(to_cells(road, end)), 0, road.drivable.shape[::-1]).astype(np.int64)
-        for end in (poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
-    )
-    cells = road.drivable[low[1] : high[1] + 1, low[0] : high[0] + 1]
-    change = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    rows, first = np.nonzero(change > 0)
-    _, last = np.nonzero(change < 0)
-    runs = shapely.union_all(shapely.box(first, rows, last, rows + 1))
-    return shapely.transform(runs, lambda cells: to_metres(road, cells + low))
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    """The drivable area, as far as it matters for some poses.
+
+    Attributes:
+        road: the road.
+        first: (2,) column and row of the first cell.
+        cells: (H, W) whether they are drivable.
+    """
+
+    road: Road
+    first: Ints
+    cells: Bools
+
+    @classmethod
+    def around(cls, road: Road, poses: Floats, half: tuple[float, float]) -> "_Ground":
+        """Return the area around a footprint at poses (P, 3)."""
+        reach = MAX_DEPTH_M + math.hypot(*half)
+        low, high = (
+            np.clip(np.floor(to_cells(road, end)), 0, road.drivable.shape[::-1]).astype(np.int64)
+            for end in (poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
+        )
+        return cls(road, low, road.drivable[low[1] : high[1] + 1, low[0] : high[0] + 1])
+
+    @cached_property
+    def pavement(self) -> BaseGeometry:
+        """The drivable cells as one polygon."""
+        change = np.diff(np.pad(self.cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+        rows, first = np.nonzero(change > 0)
+        _, last = np.nonzero(change < 0)
+        runs = shapely.union_all(shapely.box(first, rows, last, rows + 1))
+        area = shapely.transform(runs, lambda cells: to_metres(self.road, cells + self.first))
+        shapely.prepare(area)
+        return area
+
+    @cached_property
+    def _depth_cells(self) -> Floats:
+        """Distances [cells] from centres of closed cells to drivable squares, with a wide rim."""
+        return distance_field(np.pad(~self.cells, self._rim, constant_values=True))
+
+    @property
+    def _rim(self) -> int:
+        return 2 * math.ceil(MAX_DEPTH_M / self.road.resolution) + 2
+
+    def is_out(self, poses: Floats, half: tuple[float, float], limit: float) -> Bools:
+        """Return (P,) whether a point of a footprint is outside by more than 0 and a limit [m]."""
+        fits = footprint_fits(self.road, poses, 2.0 * half[0], 2.0 * half[1])
+        out = np.asarray(~fits)
+        places, least, most = self._bounds(poses[out], _grid(half))
+        is_sure = np.asarray((least >= limit + _ROUNDING_M).any(axis=1))
+        unsure = (most >= limit - _ROUNDING_M) & ~is_sure[:, None]
+        depths = np.zeros(least.shape)
+        depths[unsure] = self._depths(places[unsure])
+        out[out] = is_sure | ((depths >= limit) & (depths > 0.0)).any(axis=1)
+        return out
+
+    def greatest_depths(self, poses: Floats, points: Floats) -> Floats:
+        """Return (P, M) how far [m] points (M, 2) of a footprint at poses (P, 3) are outside.
+
+        It is 0 for points that are surely not the farthest ones.
+        """
+        places, least, most = self._bounds(poses, points)
+        deep = most >= least.max() - _ROUNDING_M
+        depths = np.zeros(deep.shape)
+        depths[deep] = self._depths(places[deep])
+        return depths
+
+    def _depths(self, places: Floats) -> Floats:
+        """Return (K,) how far [m] places (K, 2) [m] are outside."""
+        distance = shapely.distance(shapely.points(places), self.pavement)
+        return np.asarray(np.nan_to_num(distance, nan=MAX_DEPTH_M).clip(max=MAX_DEPTH_M))
+
+    def _bounds(self, poses: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return places (P, M, 2) of points of a footprint, and their least and greatest depths.
+
+        A point is as deep as the centre of its cell, but for the distance between them.
+        """
+        places = place(poses[:, None], *points.T)
+        cell = to_cells(self.road, places) - self.first + self._rim
+        inside = np.clip(np.floor(cell), 0, np.array(self._depth_cells.shape[::-1]) - 1)
+        between = np.hypot(*np.moveaxis(cell - inside - 0.5, -1, 0))
+        column, row = np.moveaxis(inside.astype(np.int64), -1, 0)
+        about, size = self._depth_cells[row, column], self.road.resolution
+        between[about == 0.0] = 0.0  # they are in drivable cells
+        least = np.minimum((about - between) * size, MAX_DEPTH_M)
+        return places, least, np.minimum((about + between) * size, MAX_DEPTH_M)
