@@ -24,11 +24,10 @@ WIDTH, HEIGHT = 600, 360  # pixels
 STEP_S = 0.2
 PAUSE_S = 1.0  # at the end of the film
 MARGIN_M = 12.0
-MAX_VIEW_M = 110.0
 COLOURS = ("#0b6e99", "#d9622b", "#4c8f2f")
 HEAD = """# Gallery
 
-What can be generated? Each film shows one scenario. Vehicles are numbered in the order of the recording. `python docs/gallery.py` draws this page.
+What can be generated? Each film shows one scenario, from `scenario-gen generate LOG --road ROAD --count 1 --seed 7`. Vehicles are numbered in the order of the recording. `python docs/gallery.py` draws this page.
 """
 
 
@@ -40,6 +39,7 @@ class Scene:
     title: str
     log: str
     road: str
+    view: float = 110.0  # m, at most
 
 
 SCENES = (
@@ -57,12 +57,20 @@ SCENES = (
     ),
     Scene("following", "Following in a curve", f"{RECORDED}/v2x_following.csv", "curve"),
     Scene(
+        "roundabout",
+        "Following around a roundabout",
+        f"{RECORDED}/v2x_following.csv",
+        "roundabout",
+        view=190.0,
+    ),
+    Scene(
         "map",
         "The left turn on an OpenDRIVE map",
         f"{RECORDED}/ngsim_left_turn.csv",
         "examples/town.xodr",
     ),
     Scene("crossing", "Slowing down for a crossing car", "examples/my_log.csv", "four_way"),
+    Scene("merge", "Merging behind a car", "examples/merge.csv", "merge"),
     Scene(
         "all_way_stop",
         "Three cars at an all-way stop",
@@ -79,24 +87,26 @@ def main() -> None:
         (encounter,) = read_log(ROOT / scene.log).encounters
         road = scene.road if "/" not in scene.road else str(ROOT / scene.road)
         result = generate(encounter, road, count=1, seed=SEED)
-        (PICTURES / f"{scene.name}.svg").write_text(film(result[0], result.road), encoding="utf-8")
+        (PICTURES / f"{scene.name}.svg").write_text(
+            film(result[0], result.road, scene.view), encoding="utf-8"
+        )
         source = "Recorded" if scene.log.startswith(RECORDED) else "Invented"
         words = "; ".join(result.reacting["sentences"]) or "no reactions detected"
-        command = f"scenario-gen generate {scene.log} --road {scene.road} --count 1 --seed {SEED} --out out/{scene.name}"
+        place = f"`{scene.log}` on `{scene.road}`"
         parts.append(
-            f"## {scene.title}\n\n![{scene.title}](gallery/{scene.name}.svg)\n\n{source}: {words}.\n\n```sh\n{command}\n```\n"
+            f"## {scene.title}\n\n![{scene.title}](gallery/{scene.name}.svg)\n\n{source}, {place}: {words}.\n"
         )
     PAGE.write_text("\n".join(parts), encoding="utf-8")
     draw_tutorial()
 
 
-def film(scenario: Scenario, road: Road) -> str:
-    """Return an animated SVG of a scenario on its road, with numbered vehicles."""
+def film(scenario: Scenario, road: Road, most: float) -> str:
+    """Return an animated SVG of a scenario on at most `most` [m] of its road, with numbered vehicles."""
     places = scenario.position.reshape(-1, 2)
     low, high = places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
     apart = np.linalg.norm(scenario.position[0] - scenario.position[1], axis=-1)
     meeting = scenario.position[:2, np.argmin(apart)].mean(axis=0)
-    view = np.minimum(high - low, (MAX_VIEW_M, MAX_VIEW_M * HEIGHT / WIDTH))
+    view = np.minimum(high - low, (most, most * HEIGHT / WIDTH))
     centre = np.where(high - low > view, meeting, (low + high) / 2.0)
     pixels = min(WIDTH / view[0], HEIGHT / view[1])
 

@@ -23,7 +23,9 @@ UNITS = {
 """Figures that a target can be set on, with units; see `method.evaluation.measures`."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
 _FORM = "NAME=LOW..HIGH, NAME < HIGH or NAME > LOW, with NAME[a] or NAME[a,b] for some vehicles"
-_TARGET = re.compile(r"([^=<>\[]*)(?:\[([^=<>]*)\]\s*)?(=|[<>]=?)(.*)", re.DOTALL)
+_TARGET = re.compile(
+    r"([^=<>\[]*)(?:\[([^=<>]*)\]\s*)?(?:=(.*)\.\.(.*)|<=?(.*)|>=?(.*))", re.DOTALL
+)
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2] < 2"
 
 
@@ -142,29 +144,31 @@ def read_targets(text: str) -> tuple[Target, ...]:
 def _read_target(piece: str) -> Target:
     """Return the target in a text such as `ttc[1,2]=1..2` or `ttc < 2`."""
     match = _TARGET.fullmatch(piece)
-    name, ids, sign, bounds = match.groups() if match else ("", None, "=", "")
+    name, ids, *bounds = match.groups() if match else ("", "", "", "", "", "")
     name = name.strip()
-    if sign != "=":
-        bounds = f"..{bounds}" if sign[0] == "<" else f"{bounds}.."
     vehicles = () if ids is None else tuple(word.strip() for word in ids.split(","))
-    words = [word.strip() for word in bounds.split("..")]
-    if len(words) != 2 or len(vehicles) > 2 or not all(vehicles):
+    if len(vehicles) > 2 or not all(vehicles):
         raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
     if name not in UNITS:
         raise InputError(f"target: {name!r} is none of {', '.join(UNITS)}")
+    low, high, below, above = ((word or "").strip() for word in bounds)
+    return Target(name, *_range(piece, low or above, high or below), vehicles)
+
+
+def _range(piece: str, low: str, high: str) -> tuple[float, float]:
+    """Return the bounds of a target, infinite where there is none."""
     try:
-        low = float(words[0] or -math.inf)
-        high = float(words[1] or math.inf)
+        bounds = float(low or -math.inf), float(high or math.inf)
     except ValueError:
         raise InputError(
             f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`"
         ) from None
-    if not low < high or (math.isinf(low) and math.isinf(high)):
+    if not bounds[0] < bounds[1] or all(map(math.isinf, bounds)):
         raise InputError(
             f"target: {piece!r}: the lower bound must be below the upper one, "
             "and one of them finite"
         )
-    return Target(name, low, high, vehicles)
+    return bounds
 
 
 def split_pieces(text: str) -> list[str]:

@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.source_files import ROOT
 from support.textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.pipeline import generate
@@ -182,6 +184,12 @@ def test_a_recorded_roundabout_goes_onto_one_of_its_size_though_its_arms_are_dri
         truck = Vehicle("0", 7.0, 2.5, "truck", Trailer("t", 10.0, 2.5, 3.2, 4.5))
         towing = replace(encounter, vehicles=(truck, encounter.vehicles[1]))
         assert len(generate(towing, "roundabout", count=1, seed=1)) == 1
+
+
+def test_a_bend_is_no_second_lane_of_a_roundabout():
+    """Two arms of the ring are 51° from a right angle, and one car follows the other."""
+    (encounter,) = read_log(ROOT / "scenario_gen/resources/recorded/v2x_following.csv")
+    assert len(generate(encounter, "roundabout", count=1, seed=7)) == 1
 
 
 def test_roads_without_a_template_are_of_their_kind():
