@@ -3,9 +3,9 @@
 
 """Sets that test a planner: every speed law fails in most scenarios, and who looks passes.
 
-The ego crosses or joins a stream with one gap. The gap opens at different times, and in half of
-the templates the ego then stands in a queue. A scenario is kept if no speed law of the family
-passes too many of the set, and if the reference drive and `IdmFollower` pass.
+The ego crosses or joins a stream with one gap. The gap opens at different times, and an ego that
+has crossed then stands in a queue for a short or a long time. A scenario is kept if no speed law
+of the family passes too many of the set, and if the reference drive and `IdmFollower` pass.
 """
 
 from collections import Counter
@@ -45,9 +45,9 @@ from scenario_gen.types import (
     YIELD,
 )
 
-OPEN_S = (2.5, 3.0, 6.5, 6.5, 10.5, 10.0, 14.5, 13.5, 18.5, 17.0)
-"""Times at which the stream has its gap: after every other one the ego stands in a queue."""
-QUEUE_S = (0.0, 4.0)  # of the ego behind the conflict area, alternately
+OPEN_S = (3.0, 4.5, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 16.5)
+"""Times at which the reference drive enters the gap."""
+QUEUE_S = (1.5, 5.5)  # of the ego behind the conflict area, alternately
 TRIED_PER_KEPT_COUNT = 5  # valid scenarios of a template, before it is given up
 MAX_LAW_SHARE = 0.1  # of a set that tests, which a speed law may pass
 DRIVERS_SHARE = 0.2  # by which drivers of a stream differ, of that of recorded drivers

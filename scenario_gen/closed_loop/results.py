@@ -143,9 +143,9 @@ class Drives:
         return ""
 
     def _outcomes_note(self) -> str:
-        """Return how many drives pass with each outcome of the decisions, if they were drawn."""
+        """Return how many drives pass with each outcome of the decisions, if there are several."""
         drawn = self.table.filter(like="decision.").columns.tolist()
-        if not drawn:
+        if not drawn or self.table["decision.outcome"].nunique() == 1:
             return ""
         passed = self.table.groupby("decision.outcome", sort=False).passed.agg(["sum", "size"])
         counts = [f"{name}: {hits} of {of}" for name, hits, of in passed.itertuples()]

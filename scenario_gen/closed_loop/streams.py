@@ -7,6 +7,10 @@ The vehicle for which the ego waits in a recorded encounter drives again and aga
 path, close behind itself, except once: at a chosen time the ego has room to cross or to merge.
 The ego stops before their conflict area, and departs into that gap. Paths are the recorded ones,
 extended straight; speeds are those of a driver who waits.
+
+The reference drive departs when the gap has been open for a while, and follows the queue closely:
+who has its speeds a second later meets the stream, and a second earlier the queue. A planner that
+looks may depart as soon as the gap opens, and later into the queue.
 """
 
 from dataclasses import dataclass, replace
@@ -26,17 +30,17 @@ BRAKING_MPS2 = 2.0  # of the ego that stops in a queue
 STOPPING_MARGIN_M = 2.5  # from the ego that waits to the conflict area
 MIN_STREAM_MPS = 4.0  # speed of the stream
 TOP_SPEED_MPS = 14.0  # of the ego
-CLOSED_S = 0.85  # between two vehicles of the stream, in the conflict area
-SPARE_BEFORE_S = 0.9  # from the stream to the ego
-SPARE_AFTER_S = 2.1  # from the ego to the stream
-APPEARS_M = 35.0  # before the conflict area
-EXIT_M = 20.0  # from the conflict area to the goal of the ego
-EXTENSION_M = 40.0  # of both paths, straight
+CLOSED_S = 1.3  # between two vehicles of the stream, in the conflict area
+SPARE_S = (1.9, 1.3)  # from the stream to the ego that crosses, and from the ego to the stream
+MERGE_SPARE_S = (0.9, 1.7)  # of an ego that merges; no queue stops it
+APPEARS_M = 55.0  # before the conflict area
+EXIT_M = 30.0  # from the conflict area to the goal of the ego
+EXTENSION_M = 60.0  # of both paths, straight
 LONGEST_S = 30.0  # from the conflict area to the goal
 OVERTIME_S = 5.0  # for which the stream lasts after the ego has arrived
-QUEUE_M = 9.0  # from the conflict area to where the ego stands in a queue
-QUEUE_GAP_M = 3.5  # ahead of it
-HEADWAY_S = 1.0  # by which the queue departs before the ego
+QUEUE_M = 7.0  # from the conflict area to where the ego stands in a queue
+QUEUE_GAP_M = 2.0  # ahead of it
+HEADWAY_S = 0.4  # by which the queue departs before the ego
 MIN_SAMPLES_COUNT = 5  # of a vehicle of the stream
 LEAVES_M = 26.0  # behind the conflict area and the goal of the ego
 
@@ -178,10 +182,11 @@ class Stream:
         slower = other.speed - min(ego.speed, ACCELERATION_MPS2 * (clears - departs))
         catching_up = self.joins * max(slower, 0.0) ** 2 / (2.0 * ACCELERATION_MPS2 * other.speed)
         times = times[: arrives + round(OVERTIME_S / dt)]
+        spare_before, spare_after = MERGE_SPARE_S if self.joins else SPARE_S
         occupied = (other.exit - other.entry) / other.speed
         period = occupied + CLOSED_S
-        before = np.arange(time - SPARE_BEFORE_S - occupied, -LEAVES_M / other.speed, -period)
-        after = np.arange(clears + SPARE_AFTER_S + catching_up, times[-1], period)
+        before = np.arange(time - spare_before - occupied, -occupied, -period)
+        after = np.arange(clears + spare_after + catching_up, times[-1], period)
         entries = np.concatenate([before[::-1], after])
         stations = np.vstack(
             [driven[: len(times)], other.entry + other.speed * (times - entries[:, None])]

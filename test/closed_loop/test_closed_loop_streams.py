@@ -10,7 +10,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.streams import SPARE_AFTER_S, SPARE_BEFORE_S, Stream
+from scenario_gen.closed_loop.streams import CLOSED_S, SPARE_S, Stream
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -55,11 +55,11 @@ def test_a_stream_has_one_gap_at_the_requested_time(stream, queue):
     assert len(before) >= 4 and len(after) >= 3
     last, following = before[-1], after[0]
     assert last.entry_second == pytest.approx(8.0, abs=0.3)
-    assert last.encroachment == pytest.approx(SPARE_BEFORE_S, abs=0.3)
-    assert following.encroachment == pytest.approx(SPARE_AFTER_S, abs=0.4)
+    assert last.encroachment == pytest.approx(SPARE_S[0], abs=0.3)
+    assert following.encroachment == pytest.approx(SPARE_S[1], abs=0.4)
     exits = [c.exit_first for c in before]
     entries = [c.entry_first for c in before]
-    assert max(np.subtract(entries[1:], exits[:-1])) < 1.0  # closed before the gap
+    assert max(np.subtract(entries[1:], exits[:-1])) < CLOSED_S + 0.1  # closed before the gap
 
 
 def test_who_insists_does_not_wait_for_an_ego_that_is_late(stream):
