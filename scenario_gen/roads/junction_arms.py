@@ -66,10 +66,22 @@ class PathEnd:
 
 @dataclass(eq=False)
 class ArmDirection:
-    """The direction [rad] of an arm, and the ends of paths on it."""
+    """An arm of a junction.
+
+    Attributes:
+        yaw: the recorded direction [rad].
+        ends: of the paths on it.
+        turned: [rad] by which it is drawn in another direction.
+    """
 
     yaw: float
     ends: list[PathEnd]
+    turned: float = 0.0
+
+    @property
+    def drawn(self) -> float:
+        """The direction [rad] in which it is drawn."""
+        return self.yaw + self.turned
 
     def reach(self, tracks: tuple[Track, ...]) -> float:
         """Return how far [m] from the centre the footprints on it reach."""
@@ -227,14 +239,14 @@ def _make_regular(arms: list[ArmDirection], tracks: tuple[Track, ...]) -> None:
         assert longest is not None
         off = angle_between(arm.yaw, longest.yaw)
         deviation = off - np.round(off / (np.pi / 2.0)) * np.pi / 2.0
-        arm.yaw -= float(np.clip(deviation, -_UNNOTICED_TURN_RAD, _UNNOTICED_TURN_RAD))
+        arm.turned = -float(np.clip(deviation, -_UNNOTICED_TURN_RAD, _UNNOTICED_TURN_RAD))
 
 
 def _fill_to_count(name: str, arms: list[ArmDirection]) -> None:
     """Add arms opposite or at right angles to others until a road has its number."""
     while len(arms) < ARM_COUNT[name]:
-        yaws = [arm.yaw + k * np.pi / 2.0 for arm in arms for k in (2, 1, 3)]
-        free = [min(abs(angle_between(yaw, arm.yaw)) for arm in arms) for yaw in yaws]
+        yaws = [arm.drawn + k * np.pi / 2.0 for arm in arms for k in (2, 1, 3)]
+        free = [min(abs(angle_between(yaw, arm.drawn)) for arm in arms) for yaw in yaws]
         widest = int(np.argmax(np.round(np.minimum(free, np.pi / 2.0), 6)))
         arms.append(ArmDirection(yaws[widest], []))
 

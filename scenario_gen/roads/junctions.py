@@ -87,7 +87,7 @@ def draw_junction(name: str, situation: Situation, config: RoadConfig) -> Road:
 
 def _westwards(centre: Floats, direction: ArmDirection) -> Floats:
     """Return the recording's frame (3,) on a road about the origin, with an arm to the west."""
-    turn = np.pi - direction.yaw
+    turn = np.pi - direction.drawn
     return np.array([*place(np.array([0.0, 0.0, turn]), -centre[0], -centre[1]), turn])
 
 
@@ -126,10 +126,10 @@ def _arms_of(
         lane_of.update({key: (len(arms), lane) for key, lane in lanes.lane_of.items()})
         offset = lanes.offset
         if not direction.ends:  # straight on from the arm opposite
-            facing = [np.cos(other.yaw - direction.yaw) < _FACING for other in directions]
+            facing = [np.cos(other.drawn - direction.drawn) < _FACING for other in directions]
             offset = -sum(at for at, faces in zip(offsets, facing, strict=False) if faces)
         offsets.append(offset)
-        arm = Arm.towards(direction.yaw + turn, reach, inward, offset)
+        arm = Arm.towards(direction.drawn + turn, reach, inward, offset)
         arms.append(replace(arm, outward=outward))
     return arms, lane_of
 
@@ -273,7 +273,7 @@ def _ring_plan(
     tracks: tuple[Track, ...],
 ) -> Plan:
     """Return the plan of a roundabout with arms in some directions, which all give way."""
-    turn = np.pi - directions[0].yaw
+    turn = np.pi - directions[0].drawn
     arms, _ = _arms_of(name, directions, tracks, turn, config, ring.radius)
     length = max((track.vehicle.length for track in tracks), default=5.0)
     width = max((track.vehicle.width for track in tracks), default=2.0) + 2.0 * _SWEPT_MARGIN_M
