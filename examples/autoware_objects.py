@@ -45,7 +45,8 @@ class AutowareObjects(Node):
 
     def receive(self, topic: str, data: bytes) -> None:
         """Keep the newest scenario; a new one begins at once."""
-        for _, _, scenario in self.decoder.add(topic, data):
+        if decoded := self.decoder.add(topic, data):
+            _, _, scenario = decoded
             self.encoder, self.k = AutowareEncoder(scenario), 0
 
     def step(self) -> None:

@@ -67,7 +67,8 @@ class Obstacles(Node):
         if topic == "map":
             _, self.road = decode_map(data)
             return
-        for _, _, scenario in self.decoder.add(topic, data):
+        if decoded := self.decoder.add(topic, data):
+            _, _, scenario = decoded
             self.scenario, self.start_ns = scenario, self.get_clock().now().nanoseconds
 
     def publish(self) -> None:
