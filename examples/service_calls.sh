@@ -14,11 +14,11 @@ ros2 service call /gp_sampler/generate rcl_interfaces/srv/SetParametersAtomicall
 ros2 service call /segmenter/segment std_srvs/srv/Trigger
 # {success: true, message: started}
 ros2 service call /road_server/get_map nav_msgs/srv/GetMap
-# {map: {header: {frame_id: map}, info: {width: 567, height: 55}}}
+# {map: {header: {frame_id: map}, info: {width: 587, height: 55}}}
 ros2 service call /road_server/load_map nav_msgs/srv/LoadMap "{map_url: 'file:///no/such/map.yaml'}"
 # {result: 1}
 ros2 service call /road_server/load_map nav_msgs/srv/LoadMap "{map_url: straight}"
-# {result: 0, map: {info: {width: 567}}}
+# {result: 0, map: {info: {width: 587}}}
 ros2 service call /log_player/play std_srvs/srv/Trigger
 # {success: true, message: started}
 ros2 service call /recorder/start std_srvs/srv/Trigger
