@@ -19,8 +19,9 @@ alternate. A search with a larger budget begins with the drives of a smaller one
   regression. The drives of a batch are in random order: a batch that the budget cuts short counts
   with the share that was driven.
 
-Where the first moves of an exploration do not lead nearer to failure, nothing foretells it: the
-run is cut, hardly anything is explored, and every natural scenario is driven (plain sampling).
+Where the moves of an exploration neither lead nearer to failure nor find two, nothing foretells
+it: the run is cut, hardly anything is explored, and every natural scenario is driven (plain
+sampling).
 """
 
 from collections.abc import Collection, Sequence
@@ -204,7 +205,7 @@ class Search:
         last = len(self.z) - len(population) + allowed  # number of drives at which it is cut
         seed_count = len(population) // SETTINGS.members_per_seed
         step = SETTINGS.first_step
-        self._traced = True
+        self._traced, first = True, len(self.z)
         for _ in range(SETTINGS.max_levels):
             order = sorted(population, key=lambda k: (self._distance(k, target), k))
             seeds = order[:seed_count]
@@ -217,7 +218,9 @@ class Search:
             step = min(max(step, 0.05), 1.0)
             if self.worst:
                 continue
-            self._traced = goal <= 0.0 or share >= SETTINGS.traced_share
+            failures = self._failure_count(range(first, len(self.z)))
+            is_found = goal <= 0.0 or failures >= SETTINGS.traced_failures
+            self._traced = is_found or share >= SETTINGS.traced_share
             if threshold <= 0.0 or len(self.z) >= last or not self._traced:
                 break
 

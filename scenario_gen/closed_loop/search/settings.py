@@ -24,7 +24,8 @@ class SearchSettings:
         first_step: standard deviation of the noise of the first moves, in that of a candidate.
         accepted_share: of the moves, to which the step is adapted.
         traced_share: of the moves that must stay as near to failure as the level before; fewer say
-            that nothing foretells failure.
+            that nothing foretells failure, unless moves fail.
+        traced_failures: number of moves of an exploration that fail, which is a trace, too.
         untraced_share: share of the drives that explore then; all others are natural.
         batch: natural candidates that are drawn at once.
         refit_ratio: growth of the number of drives that asks for a new regression.
@@ -59,6 +60,7 @@ class SearchSettings:
     first_step: float = 0.5
     accepted_share: float = 0.4
     traced_share: float = 0.25
+    traced_failures: int = 2
     untraced_share: float = 0.05
     batch: int = 256
     refit_ratio: float = 1.1
