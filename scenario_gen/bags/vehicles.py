@@ -148,8 +148,10 @@ def _samples(
 
     with guarded(f"{place(rows[0])}: not a {kind}", struct.error, UnicodeDecodeError):
         texts, end = _texts(first, order, _LAYOUTS[kind].n_strings)
-    has_status = kind == FIX
-    if begin != end + has_status * 4 + (_HEAD_BYTES - end - has_status * 4) % 8:
+    behind = end
+    if kind == FIX:  # a status of one byte, and an aligned service of two
+        behind += 3 + (end + 1) % 2
+    if begin != behind + (_HEAD_BYTES - behind) % 8:
         raise InputError(f"{place(rows[0])}: not a {kind}")
     n = len(rows)
     unknown = np.full(n, np.nan)

@@ -19,7 +19,7 @@ from support.synthetic_cases import fix_message, nanoseconds_to_time, twist_mess
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.definitions import definition, type_store
-from scenario_gen.bags.vehicles import FIX, ODOMETRY, POSE, TRANSFORMS, TWIST
+from scenario_gen.bags.vehicles import decode_samples, FIX, ODOMETRY, POSE, TRANSFORMS, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 import scenario_gen.logs.bag
@@ -604,3 +604,17 @@ def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):
         ):
             with pytest.raises(InputError, match=r"no topic to read, it has .*msgs"):
                 read_log(path)
+
+
+@pytest.mark.parametrize("frame", ["gps" + "x" * k for k in range(9)])
+def test_a_fix_is_read_whatever_the_length_of_its_frame(frame):
+    store = type_store()
+    types = store.types
+    fix = types[FIX](
+        types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](7, 5), frame),
+        types["sensor_msgs/msg/NavSatStatus"](0, 1),
+        *(48.1, 11.5, 500.0, np.zeros(9), 0),
+    )
+    (samples,) = decode_samples([bytes(store.serialize_cdr(fix, FIX))], FIX, str)
+    assert samples.fix.tolist() == [[48.1, 11.5]] and samples.height.tolist() == [500.0]
+    assert samples.stamp_ns.tolist() == [7_000_000_005] and samples.frame == ""
