@@ -302,7 +302,9 @@ class Namespace(RecordedScenarios):
     @cached_property
     def encounter(self) -> Encounter:
         """The newest tracks."""
-        encounter = decode_tracks(self.data("tracks")[-1], f"{self.path.stem}{self.name}")
+        names = [entry.template for entry in self.entries if entry.template]
+        name = names[-1] if names else f"{self.path.stem}{self.name}"
+        encounter = decode_tracks(self.data("tracks")[-1], name)
         return (
             replace(encounter, source=self.summaries[-1].source) if self.summaries else encounter
         )

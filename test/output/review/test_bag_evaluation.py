@@ -65,7 +65,7 @@ def test_the_figures_survive_the_bag(tmp_path):
     cases = [report_case(6), report_case(4, "second")]
     bag = write_recording(tmp_path / "run", {"/case_1": cases[0], "/case_2": cases[1]})
     found = [result.evaluation for result in results(bag)]
-    assert [evaluation.encounter for evaluation in found] == ["run/case_1", "run/case_2"]
+    assert [evaluation.encounter for evaluation in found] == ["crossing", "second"]
     for evaluation, case in zip(found, cases, strict=True):
         assert evaluation.changepoints == 2
         for key in ("e_position", "e_speed", "js_speed", "min_distance", "pet", "diversity"):
