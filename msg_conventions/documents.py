@@ -88,18 +88,22 @@ def plain(value: Any) -> Any:
     if isinstance(value, Note):
         return [note_kinds([value]), str(value)]
     if is_dataclass(value):
-        values = {each.name: plain(getattr(value, each.name)) for each in fields(value)}
-        defaults = _defaults(value.__class__)
-        return {key: each for key, each in values.items() if each != defaults.get(key, MISSING)}
+        return _members(value)
     if isinstance(value, np.ndarray):
         return plain([] if _is_unknown(value) else value.tolist())
     if isinstance(value, Mapping):
         return {key: plain(each) for key, each in value.items()}
-    if isinstance(value, frozenset):
-        return sorted(value)
     if isinstance(value, Collection) and not isinstance(value, str):
-        return [plain(each) for each in value]
+        items = sorted(value) if isinstance(value, frozenset) else value
+        return [*map(plain, items)]
     return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _members(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that differ from their defaults, as what JSON has."""
+    values = {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+    defaults = _defaults(value.__class__)
+    return {key: each for key, each in values.items() if each != defaults.get(key, MISSING)}
 
 
 def _is_unknown(values: Any) -> bool:

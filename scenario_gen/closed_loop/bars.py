@@ -111,17 +111,19 @@ def broken_bars(outcomes: Sequence[Outcome], bars: Bars) -> list[str]:
     figures = figures_of([outcome.verdict for outcome in outcomes])
     messages = []
     for name, bar in asdict(bars).items():
-        is_lower = name in LOWER_BARS
         if name in FIGURES:
-            text, unit = "{:.2f}", FIGURES[name].unit
-            value, least = figures[name].min() if is_lower else figures[name].max(), bar
-        elif name in shares:
-            text, unit = "{:.1f}", "%"
-            value, least = shares[name], 100.0 * bar
-        else:
-            continue  # no criteria are used
-        if value < least if is_lower else value > least:
-            side = "at least" if is_lower else "at most"
-            required = f"{side} {text.format(least)} {unit} is required"
-            messages.append(f"{name}: {text.format(value)} {unit}; {required}")
-    return messages
+            worst = figures[name].min() if name in LOWER_BARS else figures[name].max()
+            messages.append(_broken_bar(name, worst, bar, FIGURES[name].unit, digits=2))
+        elif name in shares:  # not criteria, if none is used
+            messages.append(_broken_bar(name, shares[name], 100.0 * bar, "%", digits=1))
+    return [message for message in messages if message]
+
+
+def _broken_bar(name: str, value: float, bar: float, unit: str, digits: int) -> str:
+    """Return a sentence on a bar that a value does not meet, else ""."""
+    is_lower = name in LOWER_BARS
+    if not (value < bar if is_lower else value > bar):
+        return ""
+    side = "at least" if is_lower else "at most"
+    required = f"{side} {bar:.{digits}f} {unit} is required"
+    return f"{name}: {value:.{digits}f} {unit}; {required}"

@@ -13,11 +13,17 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.bars import Bars, broken_bars
-from scenario_gen.closed_loop.blind import blind_rate
-from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
+from scenario_gen.closed_loop.blind import blind_rate, BlindRate
+from scenario_gen.closed_loop.comparison import (
+    compared,
+    Comparison,
+    Earlier,
+    read_drives,
+    refuse_others,
+)
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.mutants import mutation_score
-from scenario_gen.closed_loop.origin import origins_of
+from scenario_gen.closed_loop.origin import origins_of, Trial
 from scenario_gen.closed_loop.results import DRIVEN, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite, write_selection
@@ -86,6 +92,18 @@ class DriveRequest:
         )
         return reduce(assigned, named, DriveCommandConfig())
 
+    def earlier(self) -> Earlier | None:
+        """Return the drives of `against`, if it is given.
+
+        Raises:
+            InputError: they cannot be read, or there are several planners.
+        """
+        if self.against is None:
+            return None
+        if len(self.planners) > 1:
+            raise InputError("--against compares with one planner; give one --planner")
+        return read_drives(self.against)
+
 
 def drive(
     scenarios: GenerationResult | Path | str,
@@ -138,14 +156,11 @@ def drive_bags(
     Raises:
         InputError: a bag, planner, folder, parameter or the file to compare with is invalid.
     """
-    config = request.config().drive
+    commanded = request.config()
+    config = commanded.drive
     workers = request.workers or os.cpu_count() or 1
     in_processes = partial(run_trials, workers=workers)
-    earlier = None
-    if request.against is not None:
-        if len(request.planners) > 1:
-            raise InputError("--against compares with one planner; give one --planner")
-        earlier = read_drives(request.against)
+    earlier = request.earlier()
     bags = bags_in(request.sources)
     trials = read_suite(bags, request.ego, request.count)
     if earlier is not None:  # refuses before the drives
@@ -154,45 +169,55 @@ def drive_bags(
         refuse_others(dict(zip(names, digests, strict=True)), config, earlier)
     total = len(trials) * len(request.planners)
     with replaced_folder(out, DRIVEN, bags) as folder:  # refuses before the drives
-        unreactive, blind = [], None
-        if request.baseline:
-            chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_COUNT))]
-            unreactive = with_origins(in_processes(chosen, BASELINE, config), chosen)
-            loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, config) for trial in chosen]
-            blind = blind_rate(loops)
+        unreactive, blind = _baseline(trials, config, workers) if request.baseline else ([], None)
         results = []
         for number, planner in enumerate(request.planners):
-
-            def advance(done: int, _: int, before: int = number * len(trials)) -> None:
-                progress(before + done, total)
-
+            advance = _after(number * len(trials), total, progress)
             driven = (run or in_processes)(trials, planner, config, progress=advance)
             outcomes = with_origins(driven, trials)
             comparison = compared(outcomes, config, earlier) if earlier is not None else None
-            score = None
+            drives = Drives(
+                outcomes,
+                planner,
+                config,
+                trials,
+                _broken(outcomes, commanded.bars, comparison),
+                unreactive,
+                blind,
+                comparison,
+            )
             if request.mutants:
                 score = mutation_score(trials, planner, outcomes, config, workers)
                 name = f"mutants-{number + 1}" if number else "mutants"
                 score = replace(score, saved=_saved(folder / name, bags, score.smallest_set()))
-            broken = [*broken_bars(outcomes, request.config().bars), *_unusable(outcomes)]
-            if comparison is not None and comparison.worse:
-                broken.append(comparison.sentence())
-            results.append(
-                Drives(
-                    outcomes,
-                    planner,
-                    config,
-                    trials,
-                    broken,
-                    unreactive,
-                    blind,
-                    comparison,
-                    score,
-                )
-            )
+                drives = replace(drives, mutants=score)
+            results.append(drives)
         suite = Suite(results, bags)
         suite.write(folder)
     return suite
+
+
+def _baseline(
+    trials: Sequence[Trial], config: ClosedLoopConfig, workers: int
+) -> tuple[list[Outcome], BlindRate | None]:
+    """Return the outcomes of the non-reactive baseline, and how open-loop speed laws do."""
+    chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_COUNT))]
+    outcomes = with_origins(run_trials(chosen, BASELINE, config, workers), chosen)
+    loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, config) for trial in chosen]
+    return outcomes, blind_rate(loops)
+
+
+def _after(before: int, total: int, progress: Progress) -> Progress:
+    """Return the progress of drives that begin after others, among all."""
+    return lambda done, _: progress(before + done, total)
+
+
+def _broken(
+    outcomes: Sequence[Outcome], bars: Bars, comparison: Comparison | None
+) -> Sequence[str]:
+    """Return sentences on the bars that are not met, unusable drives, and a worse planner."""
+    worse = [comparison.sentence()] if comparison is not None and comparison.worse else []
+    return [*broken_bars(outcomes, bars), *_unusable(outcomes), *worse]
 
 
 def _saved(folder: Path, bags: Sequence[Path], names: Sequence[str]) -> str:

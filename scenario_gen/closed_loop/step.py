@@ -184,6 +184,17 @@ def _update_acceleration(
     after[ACCELERATION] = min(max(after[ACCELERATION], -strongest), parameters.acceleration[i])
 
 
+@kernel(inline=True)
+def _update_presence(world: World, after: Floats, may_stay: bool, vehicles: Floats) -> None:
+    """Write who is on the scene; who leaves in the ego's way drives on if it may stay."""
+    for i in range(len(world.motion)):
+        clock = after[i, CLOCK]
+        was_present = vehicles[i, 4] > 0.0
+        vehicles[i, 4] = i == world.ego or clock >= world.spans[i, 0]
+        if i != world.ego and world.leaves[i] and clock >= world.spans[i, 1]:
+            vehicles[i, 4] = may_stay and was_present and is_in_way(world, i, vehicles)
+
+
 @kernel(WORLD, DRIVER_PARAMETERS, F, F2, OUT2, OUTB2, OUT2, OUT2)
 def advance(
     world: World,
@@ -227,7 +238,6 @@ def advance(
     after[ego, HELD] = 0.0
     _fill_vehicles(world, after, vehicles)
     copy_to(vehicles[ego, :4], body)
-    certified = is_certified(matched, now)
     for i in range(len(world.motion)):
         if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
             vehicles[i, 3] = 0.0  # it stands where its motion ended
@@ -235,13 +245,8 @@ def advance(
             _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
         else:
             after[i, HELD] = 0.0
-    for i in range(len(world.motion)):
-        clock = after[i, CLOCK]
-        was_present = vehicles[i, 4] > 0.0
-        vehicles[i, 4] = i == ego or clock >= world.spans[i, 0]
-        if i != ego and world.leaves[i] and clock >= world.spans[i, 1]:
-            drives_on = parameters.reacts and was_present and not certified
-            vehicles[i, 4] = drives_on and is_in_way(world, i, vehicles)
+    may_stay = parameters.reacts and not is_certified(matched, now)
+    _update_presence(world, after, may_stay, vehicles)
 
 
 @kernel(F2, F2, B1, I)

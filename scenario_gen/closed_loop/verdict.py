@@ -348,7 +348,7 @@ def judge(
         delay=goal - loop.duration,
         min_ttc=clearance.ttc,
         min_gap=clearance.gap,
-        min_pet=0.0 if hit is not None else _pet(drive),
+        min_pet=_pet(drive) if hit is None else float(np.fmin(_pet(drive), 0.0)),
         hardest_braking=float(braking.max()),
         hard_braking=round(hard_braking_count * config.step, 9),
         jerk=_jerk(drive.accelerations, config.step),

@@ -101,17 +101,17 @@ def distance_transform(is_open: Bools, out: Floats) -> None:
 
 @kernel(inline=True)
 def _vertical_distances(is_open: Bools, out: Floats) -> None:
-    """Fill open cells of `out` (H, W) with the cells to the nearest closed one in each column."""
+    """Fill open cells of `out` (H, W), zeros, with cells to the next closed one above or below."""
     height, width = is_open.shape
-    for i in range(height):  # the nearest closed cell above
+    for i in range(height):  # above
         for j in range(width):
             if is_open[i, j]:
-                out[i, j] = (out[i - 1, j] if i > 0 else 0.0) + 1.0
-    for i in range(height - 1, -1, -1):  # and below
+                out[i, j] = out[max(i - 1, 0), j] + 1.0
+    np.minimum(out[-1], 1.0, out[-1])
+    for i in range(height - 2, -1, -1):  # and below
         for j in range(width):
             if is_open[i, j]:
-                below = out[i + 1, j] if i < height - 1 else 0.0
-                out[i, j] = min(out[i, j], below + 1.0)
+                out[i, j] = min(out[i, j], out[i + 1, j] + 1.0)
 
 
 @kernel(inline=True)

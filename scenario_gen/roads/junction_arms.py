@@ -148,8 +148,7 @@ def find_arms(
     arms = _cluster([end for end in ends if end.reaches_arm])
     _merge_to_count(name, arms, tracks)
     _assign_unreached(name, arms, [end for end in ends if not end.reaches_arm])
-    if not ring:
-        _make_regular(arms, tracks)
+    _make_regular(arms, tracks)
     if not arms:  # all ends are on the ring
         arms.append(ArmDirection(0.0, []))
     _fill_to_count(name, arms)

@@ -109,13 +109,12 @@ def _arms_of(
     lane_of: dict[EndKey, tuple[int, int]] = {}
     arms: list[Arm] = []
     offsets: list[float] = []
+    least = 1 if ring else config.lanes
     for direction in directions:
         lanes = lanes_of_arm(direction, config)
         if ring:
             lanes = ArmLanes(0.0, dict.fromkeys(lanes.lane_of, 0))
-        inward, outward = (
-            max(lanes.count(inward=side), 1 if ring else config.lanes) for side in (True, False)
-        )
+        inward, outward = (max(lanes.count(inward=side), least) for side in (True, False))
         if max(inward, outward) > _MAX_LANES_COUNT:
             raise RefusedError(
                 f"road {name} would need {max(inward, outward)} lanes in one direction; at most "
@@ -124,14 +123,19 @@ def _arms_of(
         needed = direction.reach(tracks) + END_ROOM_M + max(JUNCTION_SLACK_M, ring)
         reach = config.arm_length or max(needed, ring + MIN_ARM_M)
         lane_of.update({key: (len(arms), lane) for key, lane in lanes.lane_of.items()})
-        offset = lanes.offset
-        if not direction.ends:  # straight on from the arm opposite
-            facing = [np.cos(other.drawn - direction.drawn) < _FACING for other in directions]
-            offset = -sum(at for at, faces in zip(offsets, facing, strict=False) if faces)
+        offset = lanes.offset if direction.ends else _straight_on(direction, directions, offsets)
         offsets.append(offset)
         arm = Arm.towards(direction.drawn + turn, reach, inward, offset)
         arms.append(replace(arm, outward=outward))
     return arms, lane_of
+
+
+def _straight_on(
+    direction: ArmDirection, directions: list[ArmDirection], offsets: list[float]
+) -> float:
+    """Return the offset [m] with which an arm leads straight on from the arm opposite, or 0."""
+    facing = (np.cos(other.drawn - direction.drawn) < _FACING for other in directions)
+    return -sum(at for at, faces in zip(offsets, facing, strict=False) if faces)
 
 
 def _yielding_arms(
@@ -222,20 +226,10 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     config = fitting_width(tracks, config)
     recorded = _recorded_ring(tracks, config)
     ring = recorded or _ring_for_speed(tracks)
-    if ring.speed > np.sqrt(_RING.max_lateral_mps2 * ring.radius):
-        possible = float(np.sqrt(_RING.max_lateral_mps2 * _RING.max_radius_m))
-        raise RefusedError(
-            f"road roundabout: the recorded vehicles drive up to {ring.speed:.1f} m/s where the "
-            f"ring would be; the largest one ({_RING.max_radius_m:g} m) allows {possible:.1f} m/s"
-        )
+    _refuse_speed(ring)
     directions = find_arms(name, tracks, ring.centre, ring.radius + _RING.near_ring_m)
-    reaching = {end.vehicle for direction in directions for end in direction.ends}
-    moving = {i for i, track in enumerate(tracks) if not track.still}
-    if recorded is None and moving - reaching:
-        raise RefusedError(
-            f"road roundabout: the recorded paths are too short for its ring (radius "
-            f"{ring.radius:.0f} m for {ring.speed:.1f} m/s)"
-        )
+    if recorded is None:
+        _refuse_short_paths(tracks, directions, ring)
     for direction in directions:
         _refuse_parallel_lanes(direction, config)
     plan = _ring_plan(name, config, ring, directions, tracks)
@@ -247,6 +241,36 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     drawn_for = aligned(tracks, lane_of, frame)
     plan = replace(plan, yielding=yielding, notes=notes, drawn_for=drawn_for)
     return draw_plan(plan, name, config)
+
+
+def _refuse_short_paths(
+    tracks: tuple[Track, ...], directions: list[ArmDirection], ring: _Ring
+) -> None:
+    """Refuse vehicles whose whole path would be on the ring.
+
+    Raises:
+        RefusedError: there is one.
+    """
+    reaching = {end.vehicle for direction in directions for end in direction.ends}
+    if any(not track.still and i not in reaching for i, track in enumerate(tracks)):
+        raise RefusedError(
+            f"road roundabout: the recorded paths are too short for its ring (radius "
+            f"{ring.radius:.0f} m for {ring.speed:.1f} m/s)"
+        )
+
+
+def _refuse_speed(ring: _Ring) -> None:
+    """Refuse a ring on which vehicles cannot drive as fast as they were recorded.
+
+    Raises:
+        RefusedError: it is one.
+    """
+    if ring.speed > np.sqrt(_RING.max_lateral_mps2 * ring.radius):
+        possible = float(np.sqrt(_RING.max_lateral_mps2 * _RING.max_radius_m))
+        raise RefusedError(
+            f"road roundabout: the recorded vehicles drive up to {ring.speed:.1f} m/s where the "
+            f"ring would be; the largest one ({_RING.max_radius_m:g} m) allows {possible:.1f} m/s"
+        )
 
 
 def _refuse_parallel_lanes(direction: ArmDirection, config: RoadConfig) -> None:

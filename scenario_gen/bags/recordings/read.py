@@ -242,15 +242,16 @@ class Namespace(RecordedScenarios):
             InputError: a message is damaged.
         """
         hashes = self._fit_hashes(entry)
-        inputs_by_topic: dict[str, BagMessage] = {}
-        for topic, messages in self.messages.items():
-            if not _TEMPLATE_TOPIC.fullmatch(topic):
-                continue
-            chosen: Sequence[BagMessage] = ()
+
+        def is_input(topic: str, message: BagMessage) -> bool:
             if topic in hashes:
-                chosen = [m for m in messages if hash_of(topic, m.data) == hashes[topic]]
-            elif topic not in DOCUMENTS:
-                chosen = [m for m in messages if stamp_of(m.data, m.topic) == stamp_ns]
+                return hash_of(topic, message.data) == hashes[topic]
+            return topic not in DOCUMENTS and stamp_of(message.data, message.topic) == stamp_ns
+
+        inputs_by_topic: dict[str, BagMessage] = {}
+        for topic in filter(_TEMPLATE_TOPIC.fullmatch, self.messages):
+            messages = self.messages[topic]
+            chosen = [message for message in messages if is_input(topic, message)]
             if chosen or topic == "map":
                 inputs_by_topic[topic] = (chosen or messages)[-1]
         return inputs_by_topic
