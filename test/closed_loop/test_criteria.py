@@ -16,7 +16,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.criteria import find_criteria
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.search.objective import Objective
-from scenario_gen.closed_loop.trials import rates, run_trials, trials_of
+from scenario_gen.closed_loop.trials import run_trials, trials_of
 
 PLANNER = "scenario_gen.closed_loop.planners:NonReactive"
 
@@ -82,7 +82,7 @@ def test_a_missed_criterion_fails_the_drive_in_every_file(tmp_path):
     failure = ElementTree.parse(tmp_path / "junit.xml").getroot().find(".//failure")
     types = {"speed", "collision", "goal"}
     assert failure is not None and failure.get("type") in types
-    assert any("criteria: 100.0 %" in line for line in broken_bars(rates(result.outcomes), Bars()))
+    assert any("criteria: 100.0 %" in line for line in broken_bars(result.outcomes, Bars()))
     assert "criterion speed" in (tmp_path / "drives.html").read_text()
 
     lenient = drives(f"{here}Speed>100").outcomes
