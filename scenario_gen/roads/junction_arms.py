@@ -283,25 +283,30 @@ def lanes_of_arm(arm: ArmDirection, config: RoadConfig) -> ArmLanes:
     sure = [end.key for end in arm.ends if end.reaches_arm and end.steady >= SURE_LENGTH_M / 2.0]
     sure = sure or list(outside)
 
-    lane_of = _lanes_of_ends({key: outside[key] for key in sure}, width)
+    inward, outward = (
+        {end.vehicle for end in arm.ends if end.inward is way} for way in (True, False)
+    )
+    least = int(np.ceil(_U_TURN_WIDTH_M / width)) if inward & outward else 0
+    lane_of = _lanes_of_ends({key: outside[key] for key in sure}, width, least)
     lines = [side[key[1]] * (outside[key] - (lane_of[key] + 0.5) * width) for key in sure]
     dividing_line = float(np.mean(lines)) if lines else 0.0
-    lanes = ArmLanes(dividing_line, lane_of)
+    used = {way: [lane_of[key] for key in sure if key[1] is way] or [0] for way in (True, False)}
     for key in outside.keys() - lane_of.keys():  # the nearest lane that the arm already has
         nearest = round((outside[key] - side[key[1]] * dividing_line) / width - 0.5)
-        lane_of[key] = min(max(nearest, 0), lanes.count(inward=key[1]) - 1)
-    return lanes
+        lane_of[key] = min(max(nearest, min(used[key[1]])), max(used[key[1]]))
+    return ArmLanes(dividing_line, lane_of)
 
 
-def _lanes_of_ends(offset: dict[EndKey, float], width: float) -> dict[EndKey, int]:
-    """Return the lane of each end; lanes between the two directions may be left free."""
+def _lanes_of_ends(offset: dict[EndKey, float], width: float, least: int) -> dict[EndKey, int]:
+    """Return the lane of each end; lanes between the two directions may be left free.
+
+    Their centres are `least` widths apart or more.
+    """
     inward = {key: at for key, at in offset.items() if key[1]}
     outward = {key: at for key, at in offset.items() if not key[1]}
     free = 0
     if inward and outward:
-        between = round((min(inward.values()) + min(outward.values())) / width)
-        if {vehicle for vehicle, _ in inward} & {vehicle for vehicle, _ in outward}:  # U-turns
-            between = max(between, int(np.ceil(_U_TURN_WIDTH_M / width)))
+        between = max(round((min(inward.values()) + min(outward.values())) / width), least)
         free = min(max(between - 1, 0), _MAX_LANES_BETWEEN_COUNT)
     lanes_in, lanes_out = _numbered_lanes(inward, width), _numbered_lanes(outward, width)
     return {
