@@ -5,7 +5,7 @@
 
 from scenario_gen.method.routing.config import MakePlanner, PlanningConfig
 from scenario_gen.method.routing.legs import checked_path
-from scenario_gen.method.routing.plan import deviations, make_planner, plan_routes
+from scenario_gen.method.routing.plan import make_planner, plan_routes
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
@@ -25,7 +25,6 @@ __all__ = [
     "PoseQuery",
     "Preferences",
     "checked_path",
-    "deviations",
     "make_planner",
     "plan_routes",
 ]

@@ -15,9 +15,8 @@ from scenario_gen.method.routing.route_points import max_distance, route_along
 from scenario_gen.method.routing.search.planner import Planner
 from scenario_gen.method.routing.smooth import Curve, Guess, not_drivable, smooth
 from scenario_gen.method.routing.task import too_narrow, too_tight, VehicleTask
-from scenario_gen.numerics import Floats
 from scenario_gen.roads import footprint_fits, ground_for, own_side
-from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits
+from scenario_gen.types import Fit, Road, Route, TypeLimits
 
 MIN_ROUTE_M = 0.05  # between start and end, else the vehicle has no path
 # Shares of the largest curvature that searches may use, in turn: smoothing needs the rest.
@@ -33,9 +32,8 @@ def plan_routes(
 ) -> tuple[Route, ...]:
     """Plan one route per vehicle through its anchors.
 
-    Start and end are met exactly, with their headings; interior anchors attract the route (see
-    `deviations`). The footprint stays on the road along the whole route, and the curvature within
-    the limit.
+    Start and end are met exactly, with their headings; interior anchors attract the route.
+    The footprint stays on the road along the whole route, and the curvature within the limit.
 
     Source: paper III-B, between consecutive changepoints.
 
@@ -62,11 +60,6 @@ def plan_routes(
         task = VehicleTask(ground, vehicle, fitted, config, planner, seed + 7919 * n, curvature)
         routes.append(_route_on_lanes(task))
     return tuple(routes)
-
-
-def deviations(route: Route, fitted: FittedVehicle) -> Floats:
-    """Return how far [m] the route passes from each anchor: (K + 2,)."""
-    return np.asarray(np.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
 
 
 def make_planner(config: PlanningConfig) -> Planner:

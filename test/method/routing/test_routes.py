@@ -14,11 +14,17 @@ from support.oracle import drivable_area, footprints
 
 from benchmarks._planning_maps import recorded_maps, road_of
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.method.routing import deviations, plan_routes, PlanningConfig
+from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.roads.clearance import nearest_pose_with_room
 from scenario_gen.types import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.scenario import BoundaryStates
+
+
+def farthest_anchor(route, anchors):
+    """How far [m] a route passes from the anchor that it misses most."""
+    return np.hypot(*(route.points[route.anchor, :2] - np.array(anchors)[:, :2]).T).max()
+
 
 UP, LEFT, RIGHT = np.pi / 2, np.pi, 0.0
 CAR = Vehicle("car", 4.8, 1.9)
@@ -107,7 +113,7 @@ def test_turns_on_a_t_intersection(anchors):
     (route,) = routes_of(T, (anchors, [False] * (len(anchors) - 1)))
     assert_drivable(route, anchors)
     assert off_road_area(T, route, CAR) < 1e-6
-    assert deviations(route, fit_of((anchors, [False] * (len(anchors) - 1))).fitted[0]).max() < 0.3
+    assert farthest_anchor(route, anchors) < 0.3
 
 
 @pytest.mark.parametrize(("side", "sign"), [("right", 1.0), ("left", -1.0)])
@@ -212,5 +218,5 @@ def test_recorded_vehicles_on_their_own_map(data, name):
         fit = fit_of((anchors, stands), cars=(car,))
         (route,) = plan_routes(road, fit)
         assert_drivable(route, anchors)
-        assert deviations(route, fit.fitted[0]).max() < 0.5
+        assert farthest_anchor(route, anchors) < 0.5
         assert off_road_area(road, route, car) < 1e-6

@@ -198,12 +198,6 @@ def refuse_blocked(road: Road, query: PoseQuery) -> None:
             )
 
 
-def least_radius(road: Road, query: PoseQuery) -> float:
-    """Return the radius [m] of a disc without a way where the footprint has certainly none."""
-    half = 0.5 * min(query.width, query.length)
-    return max(half - 0.75 * road.resolution, 0.0)  # components may miss gaps between centres
-
-
 def refuse_no_way(road: Road, query: PoseQuery) -> None:
     """Raise NoWayError if not even a disc as wide as the footprint can get from start to goal."""
     if _component(road, query, _least_radius(road, query)) is None:
