@@ -13,7 +13,7 @@ from typing import Any
 
 from ompl import base
 
-from scenario_gen.method.routing.search.ompl_solve import search
+from scenario_gen.method.routing.search.ompl_solve import bounded, search
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import segment_free
 
@@ -32,13 +32,7 @@ class ExactEdges(base.MotionValidator):  # type: ignore[misc]
 
 def plane(clearance: Floats) -> Any:
     """Return OMPL's space information for the plane of a grid (H, W) in cells, without checks."""
-    space = base.RealVectorStateSpace(2)
-    bounds = base.RealVectorBounds(2)
-    for axis, extent in enumerate(clearance.shape[::-1]):
-        bounds.setLow(axis, 0.0)
-        bounds.setHigh(axis, float(extent))
-    space.setBounds(bounds)
-    return base.SpaceInformation(space)
+    return bounded(base.RealVectorStateSpace(2), clearance)
 
 
 def exact_plane(clearance: Floats, radius: float) -> Any:

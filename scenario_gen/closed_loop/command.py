@@ -30,9 +30,8 @@ from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite, write_sel
 from scenario_gen.closed_loop.trials import (
     MakePlanner,
     Outcome,
-    read_trials,
     run_trials,
-    trials_of,
+    trials_in,
     with_origins,
 )
 from scenario_gen.types import GenerationResult
@@ -129,10 +128,7 @@ def drive(
     if not (isinstance(planner, str) or callable(planner)):
         name = type(planner).__name__
         raise InputError(f"drive: pass the class {name}, not an object; every drive makes its own")
-    if isinstance(scenarios, GenerationResult):
-        trials = trials_of(scenarios, ego)
-    else:
-        trials = read_trials(Path(scenarios), ego)
+    trials = trials_in(scenarios, ego)
     outcomes = with_origins(run_trials(trials, planner, config, workers), trials)
     name = planner if isinstance(planner, str) else f"{planner.__module__}:{planner.__qualname__}"
     return Drives(outcomes, name, config, trials)

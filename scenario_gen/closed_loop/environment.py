@@ -31,7 +31,7 @@ from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import picture
 from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import read_trials, trials_of
+from scenario_gen.closed_loop.trials import trials_in
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, unit
@@ -95,12 +95,9 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
                 f"render_mode {render_mode!r} is unknown; use {', '.join(modes)} or None"
             )
         self.render_mode = render_mode
-        if isinstance(trials, Path | str):
-            self.trials = read_trials(Path(trials), ego)
-        elif isinstance(trials, GenerationResult):
-            self.trials = trials_of(trials, ego)
-        else:
-            self.trials = list(trials)
+        if isinstance(trials, GenerationResult | Path | str):
+            trials = trials_in(trials, ego)
+        self.trials = list(trials)
         if not self.trials:
             raise InputError("no scenario to drive: trials are empty")
         self.config = config

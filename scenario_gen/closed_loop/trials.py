@@ -179,6 +179,17 @@ def trials_of(result: GenerationResult, ego: str | int = "") -> list[Trial]:
     return trials
 
 
+def trials_in(scenarios: GenerationResult | Path | str, ego: str = "") -> list[Trial]:
+    """Return the scenarios of a result or of a bag as trials; `ego` as in `read_trials`.
+
+    Raises:
+        InputError: as `trials_of` and `read_trials`.
+    """
+    if isinstance(scenarios, Path | str):
+        return read_trials(Path(scenarios), ego)
+    return trials_of(scenarios, ego)
+
+
 def _encounter_of(entry: ScenarioEntry | None) -> str:
     """Return the name and the short hash of a scenario's template; "" if it is not known.
 

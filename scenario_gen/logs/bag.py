@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ class Topic:
         label: the log's name in messages to the user.
         bag: name of the bag, if several have the topic at one time; else "".
         stamps: log stamps [ns].
-        data: CDR bytes; empty once they are decoded.
+        data: CDR bytes; empty once `samples` are read.
         part: the window of time that is read, if not all of it; else "".
     """
 
@@ -88,15 +89,15 @@ class Topic:
         """Name the log, the topic and a message."""
         return f"{self.label}, topic {self.name}{self.part}, message {number}"
 
-    def decoded(self) -> list[Samples]:
-        """Return the states in its messages, whose bytes are given up to bound the memory.
+    @cached_property
+    def samples(self) -> list[Samples]:
+        """The states in its messages, whose bytes are given up to bound the memory.
 
         Raises:
             InputError: a message is damaged.
         """
         samples = decode_samples(self.data, self.type, lambda row: self.where(row + 1))
-        if self.type != TRANSFORMS:  # which are decoded for the frames, and again for vehicles
-            self.data.clear()
+        self.data.clear()
         return samples
 
     def segment(self, first_row: int) -> Segment:
@@ -364,7 +365,7 @@ def _frame_tree(topics: Sequence[Topic]) -> FrameTree:
     tree = FrameTree()
     for topic in topics:
         if topic.type == TRANSFORMS:
-            for each in topic.decoded():
+            for each in topic.samples:
                 assert each.fix is not None
                 place = each.fix[:, 0] + 1j * each.fix[:, 1]
                 tree.add(each.frame, each.child, each.stamp_ns, place, each.heading)
@@ -423,7 +424,7 @@ def _collect(
     Raises:
         InputError: a message is damaged.
     """
-    samples = topic.decoded()
+    samples = topic.samples
     received = np.array(topic.stamps, dtype=np.int64)
     header = np.zeros_like(received)
     for each in samples:

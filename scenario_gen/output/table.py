@@ -15,7 +15,6 @@ from scenario_gen.base.errors import describe, InputError, needs
 from scenario_gen.method.evaluation.measures import measure
 from scenario_gen.numerics import Floats
 from scenario_gen.types import (
-    Encounter,
     GenerationResult,
     join_ego,
     Motion,
@@ -40,7 +39,7 @@ TABLES: Mapping[str, Callable[["DataFrame"], bytes]] = {
 """The content of a file with a table, by its suffix."""
 
 
-def measures(motions: Iterable[Scenario | Encounter]) -> "DataFrame":
+def measures(motions: Iterable[Motion]) -> "DataFrame":
     """Return a row for each scenario of a result, or for each of some scenarios or encounters.
 
     The ego's reference drive counts as a vehicle.
@@ -68,7 +67,7 @@ def measures(motions: Iterable[Scenario | Encounter]) -> "DataFrame":
     return table.replace(math.inf, math.nan)
 
 
-def _joined(k: int, motion: Scenario | Encounter) -> tuple[int, Motion, Floats]:
+def _joined(k: int, motion: Motion) -> tuple[int, Motion, Floats]:
     """Return the number of a scenario, or k of an encounter; its motion and accelerations."""
     if isinstance(motion, Scenario):
         scenario = join_ego(motion)

@@ -6,7 +6,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 import re
-from typing import Self, TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
@@ -16,9 +16,6 @@ from scenario_gen.types.decision import Decision
 from scenario_gen.types.html import html_table
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.traffic_light import TrafficLight
-
-if TYPE_CHECKING:
-    from pandas import Series
 
 MAX_UNEVEN_S = 1e-6  # a time may differ by this from a whole multiple of the period
 
@@ -110,12 +107,6 @@ class Encounter(Motion):
         import scenario_gen
 
         return scenario_gen.Situation.of(self).reactions.sentences(self.vehicles)
-
-    def measures(self) -> "Series[float]":
-        """Return how critical it is, with the columns of `scenario_gen.measures` as names."""
-        import scenario_gen
-
-        return scenario_gen.measures([self]).iloc[0]
 
     @property
     def kind(self) -> str:

@@ -100,7 +100,7 @@ def cut(present: Ints, first: int, last: int) -> Ints:
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from pandas import DataFrame
+    from pandas import DataFrame, Series
 
 
 class States(NamedTuple):
@@ -404,6 +404,12 @@ class Motion:
         table = self.to_dataframe()
         rows = table.vehicle == Vehicles(self.vehicles)[vehicle].id
         return table[rows].reset_index(drop=True)
+
+    def measures(self) -> "Series[float]":
+        """Return how critical it is, with the columns of `scenario_gen.measures` as names."""
+        import scenario_gen
+
+        return scenario_gen.measures([self]).iloc[0]
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the vehicles' paths, as `scenario_gen.plot` does.

@@ -22,7 +22,7 @@ from scenario_gen.types.target import Reached
 from scenario_gen.types.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from pandas import DataFrame, Series
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +79,6 @@ class Scenario(Motion):
         other = copy(self)
         freeze(other, facts=facts)
         return other
-
-    def measures(self) -> "Series[float]":
-        """Return how critical it is, with the columns of `scenario_gen.measures` as names."""
-        import scenario_gen
-
-        return scenario_gen.measures([self]).iloc[0]
 
     def to_dataframe(self) -> "DataFrame":
         """Return a table with a row for each vehicle and each sample at which it is present.

@@ -42,15 +42,20 @@ def _pose(state: Any) -> tuple[float, float, float]:
     return state.getX(), state.getY(), state.getYaw()
 
 
-def curves(scene: Scene) -> Any:
-    """Return OMPL's space information for the Dubins curves of a vehicle, with exact checks."""
-    space = base.DubinsStateSpace(scene.body.turn_radius)
+def bounded(space: Any, clearance: Floats) -> Any:
+    """Return the information of a space whose places are on a grid (H, W) in cells."""
     bounds = base.RealVectorBounds(2)
-    for axis, extent in enumerate(scene.clearance.shape[::-1]):
+    for axis, extent in enumerate(clearance.shape[::-1]):
         bounds.setLow(axis, 0.0)
         bounds.setHigh(axis, float(extent))
     space.setBounds(bounds)
-    information = base.SpaceInformation(space)
+    return base.SpaceInformation(space)
+
+
+def curves(scene: Scene) -> Any:
+    """Return OMPL's space information for the Dubins curves of a vehicle, with exact checks."""
+    space = base.DubinsStateSpace(scene.body.turn_radius)
+    information = bounded(space, scene.clearance)
     information.setStateValidityChecker(lambda _: True)  # the sweep of a motion checks its poses
     information.setMotionValidator(ExactSweeps(information, scene))
     information.setup()
