@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
@@ -251,22 +250,25 @@ def _shifts_in_turn(log: RawLog, parts: _Parts, n_parts: int, config: LogConfig)
     part = np.concatenate([fixes for fixes, _ in parts])
     stamps = np.concatenate([vehicle.fix_ns for vehicle in log.vehicles])
     valid = ~is_out_of_range(stamps)
-    spans = pd.Series(stamps[valid]).groupby(part[valid]).agg(["min", "max"])
-    shifts = in_turn(spans, round((2.5 * config.longest_gap + 15.0) * _S_TO_NS))
-    return np.asarray(shifts.reindex(range(n_parts), method="ffill", fill_value=0))
+    stamped = np.unique(part[valid])
+    spans = [stamps[valid & (part == k)] for k in stamped]
+    gap_ns = round((2.5 * config.longest_gap + 15.0) * _S_TO_NS)
+    shifts = in_turn([(int(span.min()), int(span.max())) for span in spans], gap_ns)
+    rows = np.searchsorted(stamped, np.arange(n_parts), side="right") - 1
+    return np.asarray(shifts)[np.maximum(rows, 0)]
 
 
-def in_turn(spans: pd.DataFrame, gap_ns: int) -> "pd.Series[int]":
+def in_turn(spans: Sequence[tuple[int, int]], gap_ns: int) -> list[int]:
     """Return by how many whole seconds [ns] spans are moved, so that each follows the last one.
 
     Args:
-        spans: their first and last stamps [ns], in columns min and max.
+        spans: their first and last stamps [ns].
         gap_ns: between two of them, at least.
     """
     shifts = [0]
-    end = int(spans["max"].iloc[0])
-    for first, last in spans.iloc[1:][["min", "max"]].to_numpy().tolist():
+    end = spans[0][1]
+    for first, last in spans[1:]:
         lag = end + gap_ns - first
         shifts.append(-(-lag // _S_TO_NS) * _S_TO_NS if lag > 0 else shifts[-1])
         end = last + shifts[-1]
-    return pd.Series(shifts, index=spans.index)
+    return shifts

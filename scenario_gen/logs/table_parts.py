@@ -117,7 +117,7 @@ def apart_by_scene(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     steps = frame.groupby(["scene", "vehicle"], sort=False)["time"].diff()
     usual = float(steps[steps > 0].median()) if (steps > 0).any() else 0.0
     gap = max(_MIN_SCENE_GAP_NS, round(_MIN_SCENE_GAP_ROWS_COUNT * usual))
-    shifts = in_turn(spans, gap)
+    shifts = pd.Series(in_turn(spans.to_numpy().tolist(), gap), index=spans.index)
     shifted = frame["time"] + frame["scene"].map(shifts).astype(np.int64)
     note = f"{len(spans)} scenes that overlap in time are read one after the other"
     return frame.assign(time=shifted), [note]

@@ -31,11 +31,14 @@ _NAME = re.compile(rb"\w+")
 
 
 @cache
-def sources() -> tuple[Path, ...]:
+def _has_kernels(file: Path) -> bool:
+    """Return whether a file exists and holds kernels."""
+    return file.is_file() and _DECORATED.search(file.read_bytes()) is not None
+
+
+def sources() -> list[Path]:
     """Return the files of the package that hold kernels."""
-    return tuple(
-        file for file in sorted(PACKAGE.rglob("*.py")) if _DECORATED.search(file.read_bytes())
-    )
+    return list(filter(_has_kernels, sorted(PACKAGE.rglob("*.py"))))
 
 
 @cache
@@ -46,7 +49,7 @@ def _imported(source: Path) -> frozenset[Path]:
         modules.add(module.decode())
         modules |= {f"{module.decode()}.{name.decode()}" for name in _NAME.findall(names)}
     paths = {PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py") for module in modules}
-    return frozenset(paths.intersection(sources()))
+    return frozenset(filter(_has_kernels, paths))
 
 
 def _with_imports(source: Path) -> list[Path]:

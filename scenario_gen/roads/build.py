@@ -18,7 +18,6 @@ from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.corridor import draw_corridor
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.lights import LIT
-from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import parked_cars, read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.pavement import ARM_COUNT
@@ -168,6 +167,8 @@ def _road_without_obstacles(
         return vector_road(name_or_path, tracks, config)
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
+        from scenario_gen.roads.nav2 import read_map
+
         with reading(path):
             return read_map(path, config)
     if name_or_path not in ROADS:

@@ -20,6 +20,7 @@ import jinja2
 from markupsafe import Markup
 
 from scenario_gen.base.errors import printable_lines
+from scenario_gen.numerics.kernel_cache import root
 from scenario_gen.types import formatted
 
 
@@ -78,6 +79,7 @@ def _asset(name: str) -> str:
 def _environment(asset: Callable[[str], str]) -> jinja2.Environment:
     return jinja2.Environment(
         loader=jinja2.FunctionLoader(asset),
+        bytecode_cache=jinja2.FileSystemBytecodeCache(str(root())),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,

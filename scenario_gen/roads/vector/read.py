@@ -3,7 +3,6 @@
 
 """Vector maps, `map.osm`, `map.xodr` or `map.xml`, and the part of them behind a `#`."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
@@ -14,12 +13,10 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading, RefusedError
-from scenario_gen.base.xml_reader import Element, read_xml, to_number
+from scenario_gen.base.xml_reader import read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.obstacles import with_obstacles
-from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
-from scenario_gen.roads.vector.drafts import MapLanes
 from scenario_gen.roads.vector.ground import road_of
 from scenario_gen.roads.vector.network import extent, network_of, part_of
 from scenario_gen.roads.vector.place import best_place, places
@@ -34,18 +31,16 @@ class MapFormat:
     Attributes:
         name: of a file in it, with its article.
         root: the name of its root element.
-        lanes_of: returns the lanes below the root.
     """
 
     name: str
     root: str
-    lanes_of: Callable[[Element], MapLanes]
 
 
 FORMATS = {
-    ".osm": MapFormat("a Lanelet2 map", "osm", lanelet2.lanes_of),
-    ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE", opendrive.lanes_of),
-    ".xml": MapFormat("a CommonRoad file", "commonRoad", commonroad.lanes_of),
+    ".osm": MapFormat("a Lanelet2 map", "osm"),
+    ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE"),
+    ".xml": MapFormat("a CommonRoad file", "commonRoad"),
 }
 """By the suffix of a file's name."""
 PART_KINDS = ("lanelet", "junction", "box")
@@ -83,12 +78,16 @@ def read_network(path: Path) -> LaneNetwork:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
-    map_format = FORMATS[path.suffix.lower()]
+    from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
+
+    suffix = path.suffix.lower()
+    map_format = FORMATS[suffix]
+    lanes_of = {".osm": lanelet2, ".xodr": opendrive, ".xml": commonroad}[suffix].lanes_of
     with reading(path):
         root = read_xml(path, f"map {path}")
         if root.tag != map_format.root:
             raise InputError(f"{root.place}: the root of {map_format.name} is <{map_format.root}>")
-        return network_of(path.stem, map_format.lanes_of(root))
+        return network_of(path.stem, lanes_of(root))
 
 
 def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
