@@ -13,10 +13,9 @@ two points (cubic Hermite, without kinks). Widths and lane offsets are linear be
 date is the date of the template's stamp.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
-import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,14 +23,9 @@ from scenario_gen.numerics import Floats, running_sum
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
-from scenario_gen.output.exchange.opendrive_network import (
-    FIRST_ROAD_ID,
-    Place,
-    RoadNetwork,
-    Strip,
-)
-from scenario_gen.output.exchange.xml import add, comment, date_of, Element, serialized
-from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M, RuleKind, TrafficRule
+from scenario_gen.output.exchange.opendrive_network import Place, RoadNetwork
+from scenario_gen.output.exchange.xml import date_of, rendered
+from scenario_gen.types import CARS, DRIVERS, OBSTACLE_HEIGHT_M, RuleKind, TrafficRule
 
 _SIGNALS = {**SIGN_IDS, RuleKind.TRAFFIC_LIGHT: "1000001"}
 """Types of signals; that of a light is OpenDRIVE's."""
@@ -43,7 +37,6 @@ _LANE_TYPES = {  # with the drivers that may use them
     "biking": frozenset(("bicycle",)),
     "bus": frozenset(("bus",)),
 }
-_RESTRICTIONS = {"car": "passengerCar", "van": "delivery"}
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # on [-1, 1]
 
 
@@ -55,126 +48,67 @@ def write_opendrive(lane_map: LaneMap, name: str, start_ns: int) -> bytes:
         name: name of the network, for people.
         start_ns: stamp [ns] whose day is the file's date.
     """
-    root = Element("OpenDRIVE")
-    (west, south), (east, north) = lane_map.network.box.tolist()
-    about = {
-        "revMajor": "1",
-        "revMinor": "7",
-        "name": name,
-        "version": "1.00",
-        "date": date_of(start_ns),
-    }
-    add(
-        root,
-        "header",
-        **about,
-        north=north,
-        south=south,
-        east=east,
-        west=west,
-        vendor="scenario_gen",
-    )
-    comment(root, f"lanes: {lane_map.origin}")
     network = RoadNetwork(lane_map)
-    for n in range(len(network.strips)):
-        _road(root, lane_map, network, n)
-    for number, connections in network.connections.items():
-        _junction(root, network, number, connections)
-    return serialized(root)
+    return rendered(
+        "opendrive.xml.j2",
+        name=name,
+        date=date_of(start_ns),
+        box=lane_map.network.box.tolist(),
+        lane_map=lane_map,
+        network=network,
+        roads=[_road(network, n) for n in range(len(network.strips))],
+        cars=CARS,
+        drivers=DRIVERS,
+        lane_type=_lane_type,
+    )
 
 
-def _road(root: Element, lane_map: LaneMap, network: RoadNetwork, n: int) -> None:
-    """Append road `n` with its links, geometry, lanes, crossings and signs."""
-    strip, lanes = network.strips[n], lane_map.network.lanes
+def _road(network: RoadNetwork, n: int) -> dict[str, Any]:
+    """Return the facts of road `n`: links, geometry, lanes, objects and signals."""
+    strip, lanes = network.strips[n], network.network.lanes
     pieces = list(_pieces(strip.reference))
     station = running_sum([piece[0] for piece in pieces])
     members = [k for side in strip.lanes.values() for k in side]
-    connecting_lanes = [k for k in members if k in network.connecting]
-    junction = -1
-    if connecting_lanes:
-        junction = network.numbers[network.connecting[connecting_lanes[0]]]
-    rule = "RHT" if lane_map.side == "right" else "LHT"
-    name = ", ".join(lanes[k].id for k in members)
-    road = add(
-        root,
-        "road",
-        name=name,
-        length=float(station[-1]),
-        id=FIRST_ROAD_ID + n,
-        junction=junction,
-        rule=rule,
-    )
-    link = add(road, "link")
-    for tag, contact in (("predecessor", "start"), ("successor", "end")):
-        if (n, contact) in network.road_links:
-            add(link, tag, **network.road_links[n, contact])
-    limit = max(lanes[k].speed_limit for k in members)
-    speed: dict[str, str | float] = (
-        {"max": "no limit"} if math.isnan(limit) else {"max": limit, "unit": "m/s"}
-    )
-    add(add(road, "type", s=0.0, type="town"), "speed", **speed)
-    view = add(road, "planView")
-    for geometry in _merged(strip.reference, pieces, station):
-        _geometry(view, geometry)
-    _lane_section(road, network, strip, station)
-    lines = _stop_lines(network, n, station)
-    if objects := [*_crosswalks(network, n, station), *_obstacles(network, n, station), *lines]:
-        add(road, "objects").extend(objects)
-    _signals(road, lane_map.network, strip, station, network.places)
+    junctions = [network.connecting[k] for k in members if k in network.connecting]
+    ends = (("predecessor", "start"), ("successor", "end"))
+    line = _Line(Curve(strip.reference), station)
+    return {
+        "name": ", ".join(lanes[k].id for k in members),
+        "length": float(station[-1]),
+        "junction": network.numbers[junctions[0]] if junctions else -1,
+        "links": [
+            (tag, network.road_links[n, end])
+            for tag, end in ends
+            if (n, end) in network.road_links
+        ],
+        "limit": max(lanes[k].speed_limit for k in members),
+        "pieces": list(_merged(strip.reference, pieces, station)),
+        "offset": _linear(station, strip.offset),
+        "lanes": {
+            side: [
+                (k, _linear(station, widths))
+                for k, widths in zip(strip.lanes[side], strip.widths[side], strict=True)
+            ]
+            for side in ("left", "right")
+        },
+        "objects": [
+            *_crosswalks(network, n, station),
+            *_obstacles(network, n, line),
+            *_stop_lines(network, members, line),
+        ],
+        "signals": list(_signals(network, members, line)),
+    }
 
 
-def _geometry(view: Element, piece: "_Geometry") -> None:
-    """Append a piece of a reference line: a line, or a parametric cubic."""
-    geometry = add(
-        view, "geometry", s=piece.s, x=piece.x, y=piece.y, hdg=piece.yaw, length=piece.length
-    )
-    if piece.curve is None:
-        add(geometry, "line")
-        return
-    names = ("aU", "bU", "cU", "dU", "aV", "bV", "cV", "dV")
-    coefficients = dict(zip(names, piece.curve, strict=True))
-    add(geometry, "paramPoly3", **coefficients, pRange="normalized")
+class _Line(NamedTuple):
+    """The reference line of a road, and (K,) the arc lengths [m] of its points in the file."""
 
+    curve: Curve
+    station: Floats
 
-def _lane_section(road: Element, network: RoadNetwork, strip: Strip, station: Floats) -> None:
-    """Append the lane offset and the lanes of a road, from left to right."""
-    group = add(road, "lanes")
-    for s, value, slope in _linear(station, strip.offset):
-        add(group, "laneOffset", s=s, a=value, b=slope, c=0.0, d=0.0)
-    section = add(group, "laneSection", s=0.0)
-    for side in ("left", "center", "right"):
-        if side == "center":
-            add(add(add(section, side), "lane", id=0, type="none", level="false"), "link")
-        elif len(strip.lanes[side]):
-            parent = add(section, side)
-            order = range(len(strip.lanes[side]))
-            for m in order if side == "right" else order[::-1]:
-                widths = _linear(station, strip.widths[side][m])
-                _lane(parent, network, strip.lanes[side][m], widths)
-
-
-def _lane(
-    parent: Element, network: RoadNetwork, k: int, widths: Iterable[tuple[float, float, float]]
-) -> None:
-    """Append lane `k` with its links, widths and users."""
-    place = network.places[k]
-    users = network.users[k] or DRIVERS
-    lane = add(parent, "lane", id=place.lane_id, type=_lane_type(users), level="false")
-    link = add(lane, "link")
-    for tag, end in (("predecessor", not place.along), ("successor", place.along)):
-        if (k, end) in network.lane_links:
-            add(link, tag, id=network.lane_links[k, end])
-    for s, value, slope in widths:
-        add(lane, "width", sOffset=s, a=value, b=slope, c=0.0, d=0.0)
-    if _lane_type(users) == "driving":
-        for user in sorted(DRIVERS - users if users >= CARS else users):
-            add(
-                lane,
-                "access",
-                sOffset=0.0,
-                rule="deny" if users >= CARS else "allow",
-                restriction=_RESTRICTIONS.get(user, user),
-            )
+    def s(self, along: float) -> float:
+        """Return the arc length in the file at an arc length of the curve [m]."""
+        return float(np.interp(along, self.curve.station, self.station))
 
 
 def _lane_type(users: frozenset[str]) -> str:
@@ -185,7 +119,7 @@ def _lane_type(users: frozenset[str]) -> str:
     return "driving"
 
 
-def _crosswalks(network: RoadNetwork, n: int, station: Floats) -> Iterator[Element]:
+def _crosswalks(network: RoadNetwork, n: int, station: Floats) -> Iterator[dict[str, Any]]:
     """Yield the crossings of a road as objects, with an outline in the object's frame."""
     reference = network.strips[n].reference
     for k in network.crossings[n]:
@@ -194,123 +128,81 @@ def _crosswalks(network: RoadNetwork, n: int, station: Floats) -> Iterator[Eleme
         pose = reference[nearest]
         ahead, left = ahead_and_left(lane.outline - pose[:2], float(pose[2]))
         t = float(left.mean())
-        size = {"length": float(np.ptp(ahead)), "width": float(np.ptp(left)), "height": 0.0}
-        walk = _object(k, "crosswalk", lane.id, s=float(station[nearest]), t=t, hdg=0.0, **size)
-        outline = add(walk, "outlines/outline", id=0, closed="true")
-        for u, v in zip(ahead.tolist(), (left - t).tolist(), strict=True):
-            add(outline, "cornerLocal", u=u, v=v, z=0.0, height=0.0)
-        yield walk
+        size = (float(np.ptp(ahead)), float(np.ptp(left)), 0.0)
+        walk = _object(k, "crosswalk", lane.id, (float(station[nearest]), t, 0.0), size)
+        yield walk | {"outline": list(zip(ahead.tolist(), (left - t).tolist(), strict=True))}
 
 
-def _obstacles(network: RoadNetwork, n: int, station: Floats) -> Iterator[Element]:
+def _obstacles(network: RoadNetwork, n: int, line: _Line) -> Iterator[dict[str, Any]]:
     """Yield the obstacles that are nearest to a road as objects."""
-    curve = Curve(network.strips[n].reference)
     for number in network.obstacles[n]:
         obstacle = network.network.obstacles[number]
-        along, left = curve.project(np.array([obstacle[:2]]))
+        along, left = line.curve.project(np.array([obstacle[:2]]))
+        turn = angle_between(obstacle.yaw, float(line.curve.at(along)[0, 2]))
         yield _object(
             len(network.network.lanes) + number,
             "obstacle",
             "parked car" if obstacle.is_car else "obstacle",
-            s=float(np.interp(along[0], curve.station, station)),
-            t=float(left[0]),
-            hdg=angle_between(obstacle.yaw, float(curve.at(along)[0, 2])),
-            length=obstacle.length,
-            width=obstacle.width,
-            height=OBSTACLE_HEIGHT_M,
+            (line.s(along[0]), float(left[0]), turn),
+            (obstacle.length, obstacle.width, OBSTACLE_HEIGHT_M),
         )
 
 
-def _stop_lines(network: RoadNetwork, n: int, station: Floats) -> Iterator[Element]:
+def _stop_lines(
+    network: RoadNetwork, members: Sequence[int], line: _Line
+) -> Iterator[dict[str, Any]]:
     """Yield the stop lines of the signs and lights of a road as objects."""
-    strip = network.strips[n]
-    members = {k for side in strip.lanes.values() for k in side}
-    curve = Curve(strip.reference)
     first = len(network.network.lanes) + len(network.network.obstacles)
     for number, rule in enumerate(network.network.rules):
-        if len(rule.line) and members & set(rule.lanes):
-            along, left = curve.project(rule.line[[0, -1]])
-            size = {"length": STOP_LINE_M, "width": abs(float(left[1] - left[0])), "height": 0.0}
-            yield _object(
-                first + number,
-                "roadMark",
-                "stop line",
-                s=float(np.interp(along.mean(), curve.station, station)),
-                t=float(left.mean()),
-                hdg=0.0,
-                **size,
-            )
+        if len(rule.line) and set(members) & set(rule.lanes):
+            along, left = line.curve.project(rule.line[[0, -1]])
+            place = (line.s(along.mean()), float(left.mean()), 0.0)
+            size = (STOP_LINE_M, abs(float(left[1] - left[0])), 0.0)
+            yield _object(first + number, "roadMark", "stop line", place, size)
 
 
-def _object(number: int, kind: str, name: str, **attributes: float) -> Element:
-    """Return an object that stands on the ground."""
-    about = {"type": kind, "name": name, "orientation": "none"}
-    upright = {"zOffset": 0.0, "pitch": 0.0, "roll": 0.0}
-    return add(Element("objects"), "object", id=number, **about, **upright, **attributes)
+def _object(
+    number: int,
+    kind: str,
+    name: str,
+    place: tuple[float, float, float],
+    size: tuple[float, float, float],
+) -> dict[str, Any]:
+    """Return an object at s, t [m] and a heading [rad], with length, width and height [m]."""
+    placed = dict(zip(("s", "t", "hdg", "length", "width", "height"), place + size, strict=True))
+    return {"id": number, "type": kind, "name": name, "outline": (), **placed}
 
 
 def _signals(
-    road: Element,
-    network: LaneNetwork,
-    strip: Strip,
-    station: Floats,
-    places: Mapping[int, Place],
-) -> None:
-    """Append the signs and lights of a road at their stop lines, or else at its end."""
-    members = [k for side in strip.lanes.values() for k in side]
-    curve = Curve(strip.reference)
-    for n, rule in enumerate(network.rules):
-        lanes = [places[k] for k in members if k in rule.lanes]
+    network: RoadNetwork, members: Sequence[int], line: _Line
+) -> Iterator[dict[str, Any]]:
+    """Yield the signs and lights of a road at their stop lines, or else at its end."""
+    for number, rule in enumerate(network.network.rules):
+        lanes = [network.places[k] for k in members if k in rule.lanes]
         if lanes and rule.kind in _SIGNALS:
-            group = road.find("signals")
-            group = add(road, "signals") if group is None else group
-            _signal(group, n, rule, lanes, curve, station)
+            yield _signal(number, rule, lanes, line)
 
 
-def _signal(
-    group: Element,
-    number: int,
-    rule: TrafficRule,
-    lanes: Sequence[Place],
-    curve: Curve,
-    station: Floats,
-) -> None:
-    """Append the sign or light of a rule for some lanes of a road.
-
-    Args:
-        group: the signals of the road.
-        number: of the rule.
-        rule: the rule.
-        lanes: the lanes.
-        curve: reference line of the road.
-        station: (K,) [m] arc lengths in the file of the points of `curve`.
-    """
+def _signal(number: int, rule: TrafficRule, lanes: Sequence[Place], line: _Line) -> dict[str, Any]:
+    """Return the sign or light of the rule with a number for some lanes of a road."""
     first = lanes[0]
-    position = curve.points[-1 if first.along else 0, :2]
+    position = line.curve.points[-1 if first.along else 0, :2]
     if len(rule.line):
         position = rule.line.mean(axis=0)
-    (along,) = curve.project(position[None])[0]
-    is_light = rule.kind is RuleKind.TRAFFIC_LIGHT
-    signal = add(
-        group,
-        "signal",
-        id=_signal_id(number, first),
-        s=float(np.interp(along, curve.station, station)),
-        t=0.0,
-        type=_SIGNALS[rule.kind],
-        subtype="-1",
-        country="OpenDRIVE" if is_light else "DE",
-        name=rule.id,
-        dynamic="yes" if is_light else "no",
-        orientation="+" if first.along else "-",
-        zOffset=2.0,
-    )
-    numbers = [place.lane_id for place in lanes]
-    add(signal, "validity", fromLane=min(numbers), toLane=max(numbers))
-    if is_light:
-        yaw = float(curve.at(along)[2]) + (0.0 if first.along else np.pi)
-        x, y = position.tolist()
-        add(signal, "positionInertial", x=x, y=y, z=2.0, hdg=yaw, pitch=0.0, roll=0.0)
+    (along,) = line.curve.project(position[None])[0]
+    signal = {
+        "id": _signal_id(number, first),
+        "s": line.s(along),
+        "type": _SIGNALS[rule.kind],
+        "name": rule.id,
+        "along": first.along,
+        "lanes": [place.lane_id for place in lanes],
+        "pose": None,
+    }
+    if rule.kind is RuleKind.TRAFFIC_LIGHT:
+        yaw = float(line.curve.at(along)[2]) + (0.0 if first.along else np.pi)
+        signal["pose"] = (*position.tolist(), yaw)
+    return signal
 
 
 def _signal_id(rule: int, place: Place) -> str:
@@ -323,21 +215,6 @@ def signal_ids(lane_map: LaneMap, rule: int) -> list[str]:
     places = RoadNetwork(lane_map).places
     lanes = lane_map.network.rules[rule].lanes
     return list(dict.fromkeys(_signal_id(rule, places[k]) for k in lanes if k in places))
-
-
-def _junction(
-    root: Element, network: RoadNetwork, number: int, connections: Sequence[tuple[int, int, str]]
-) -> None:
-    """Append a junction with its connections and lane links."""
-    kind = "default" if connections[0][2] == "connectingRoad" else "direct"
-    junction = add(root, "junction", name=f"junction {number}", id=number, type=kind)
-    for n, (k, goal, tag) in enumerate(connections):
-        start = network.places[k]
-        end = network.places[goal]
-        roads = {"incomingRoad": FIRST_ROAD_ID + start.road, tag: FIRST_ROAD_ID + end.road}
-        contact = end.contact(end=False)
-        connection = add(junction, "connection", id=n, **roads, contactPoint=contact)
-        add(connection, "laneLink", **{"from": start.lane_id, "to": end.lane_id})
 
 
 Curve3 = tuple[float, ...]  # aU … dU, aV … dV, in the frame of the piece

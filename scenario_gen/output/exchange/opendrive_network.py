@@ -18,7 +18,7 @@ from scenario_gen.numerics.plane import edge_lengths, unit_left
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.types import Lane, LaneNetwork
 
-FIRST_ROAD_ID = 1
+FIRST_ROAD_ID = 1  # also in the template
 FIRST_JUNCTION_ID = 1000
 MIN_POINT_SPACING_M = 1e-6  # between two points of a reference line
 

@@ -1,15 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""XML documents that are the same bytes for the same content."""
+"""XML documents by templates; they are the same bytes for the same content."""
 
 from datetime import datetime, UTC
+from functools import cache
 import math
+from typing import Any
 import xml.etree.ElementTree as ET
 
-from scenario_gen.base.errors import InputError
+from jinja2 import Environment
+from markupsafe import Markup
 
-Element = ET.Element
+from scenario_gen.base.errors import InputError
+from scenario_gen.output.report.html import xml_environment
 
 
 def number(value: float) -> str:
@@ -24,31 +28,16 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def add(
-    parent: Element, tag: str, text: str | float | None = None, **attributes: str | float
-) -> Element:
-    """Append an element with attributes and text, and return it; see `number` for numbers.
-
-    Of a path of tags, all elements are appended, each to the one before.
-    """
-    *outer, tag = tag.split("/")
-    for name in outer:
-        parent = ET.SubElement(parent, name)
-    element = ET.SubElement(parent, tag, {key: _text(value) for key, value in attributes.items()})
-    if text is not None:
-        element.text = _text(text)
-    return element
-
-
 def _text(value: str | float) -> str:
-    if isinstance(value, str):
-        return "".join(c if c.isprintable() else " " for c in value)
-    return str(value) if isinstance(value, int) else number(value)
+    if isinstance(value, float):
+        return number(value)
+    if isinstance(value, Markup | int):  # of a macro
+        return str(value) if isinstance(value, int) else value
+    return "".join(c if c.isprintable() else " " for c in value)
 
 
-def comment(parent: Element, text: str) -> None:
-    """Append a comment."""
-    parent.append(ET.Comment(f" {_text(text).replace('--', '- -')} "))
+def _comment(text: str) -> Markup:
+    return Markup(f"<!-- {_text(text).replace('--', '- -')} -->")
 
 
 def date_of(start_ns: int) -> str:
@@ -56,8 +45,31 @@ def date_of(start_ns: int) -> str:
     return datetime.fromtimestamp(start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S")
 
 
-def serialized(root: Element) -> bytes:
-    """Return the document as indented UTF-8 bytes."""
+@cache
+def _environment() -> Environment:
+    """Return the environment, which compiles each template once."""
+    environment = xml_environment(_text)
+    environment.filters |= {"comment": _comment, "number": number}
+    return environment
+
+
+def rendered(template: str, **values: Any) -> bytes:
+    """Return a document as indented UTF-8 bytes.
+
+    Args:
+        template: a Jinja template among the assets of pages. White space in it has no effect,
+            numbers are written by `number`, and the filter `comment` makes a comment.
+        values: the variables of the template.
+
+    Raises:
+        InputError: a number is not finite.
+    """
+    text = _environment().get_template(template).render(**values)
+    builder = ET.TreeBuilder(insert_comments=True)
+    root = ET.fromstring(text, ET.XMLParser(target=builder))
+    for element in root.iter():
+        if not (element.text or "").strip():
+            element.text = None
     ET.indent(root)
     document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return document + b"\n"

@@ -67,9 +67,15 @@ def render_page(
 
 def render_xml(template: str, **values: Any) -> str:
     """Return an XML document by a template; control characters, which XML lacks, are escaped."""
-    environment = _environment(_asset)
-    environment.finalize = lambda value: printable_lines(str(value))
+    environment = xml_environment(lambda value: printable_lines(str(value)))
     return environment.get_template(template).render(**values) + "\n"
+
+
+def xml_environment(as_text: Callable[[Any], str]) -> jinja2.Environment:
+    """Return the environment of templates whose values `as_text` converts."""
+    environment = _environment(_asset)
+    environment.finalize = as_text
+    return environment
 
 
 def _asset(name: str) -> str:
