@@ -15,20 +15,20 @@ TrackedObjects of Autoware's perception (autoware_perception_msgs):
 | length, width | objects[].shape.dimensions.x, y | m |
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 import math
 from operator import attrgetter
-import struct
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from msg_conventions import odometry, topics, tracks, trajectory
+from msg_conventions import layouts, odometry, topics, tracks, trajectory
+from msg_conventions.cdr import decode
 from msg_conventions.yaw import yaw
-from scenario_gen.bags.storage.definitions import TRACKED, type_store
-from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
 
@@ -47,6 +47,16 @@ KINDS = [
     "pedestrian",
 ]  # by label
 _MIN_DIRECTION_MPS = 0.5  # a slower velocity does not show which way an object faces
+_POSED = layouts.HEADER | {"pose": layouts.POSE}  # a covariance may follow
+_LAYOUTS = {
+    FIX: layouts.FIX,
+    TWIST: layouts.VELOCITY_STAMPED,
+    ODOMETRY: layouts.ODOMETRY,
+    POSE: _POSED,
+    POSE_WITH_COVARIANCE: _POSED,
+    TRANSFORMS: layouts.TRANSFORMS,
+    TRACKED: layouts.TRACKED,
+}
 
 
 class _Orientation(IntEnum):
@@ -88,23 +98,15 @@ class Samples:
     kind: str = ""
 
 
-class _Layout(NamedTuple):
-    """How a message with a header ends: its strings, and a part of a fixed length in bytes."""
+class _State(NamedTuple):
+    """The state of a body in one message; see `Samples`. The pose is (7,), with a quaternion."""
 
-    n_strings: int
-    size: int
-
-
-_LAYOUTS = {
-    FIX: _Layout(1, 8 * 12 + 1),  # place, covariance and its type; before them the status
-    TWIST: _Layout(1, 8 * 6),
-    ODOMETRY: _Layout(2, 8 * (7 + 36 + 6 + 36)),
-    POSE: _Layout(1, 8 * 7),
-    POSE_WITH_COVARIANCE: _Layout(1, 8 * (7 + 36)),
-}
-_HEAD_BYTES = 4  # of CDR: byte order and options; alignment counts from here
-_STAMP_BYTES = 8
-_BEFORE_LINEAR_COUNT = 7 + 36  # doubles before the linear velocity of an Odometry
+    pose: Sequence[float]
+    speed: float = math.nan
+    course: float = math.nan
+    turn: float = 0.0  # from the pose to the body [rad], NaN without a heading
+    size: tuple[float, float] = (math.nan, math.nan)
+    kind: str = ""
 
 
 def decode_samples(data: Sequence[bytes], kind: str, place: Callable[[int], str]) -> list[Samples]:
@@ -118,152 +120,60 @@ def decode_samples(data: Sequence[bytes], kind: str, place: Callable[[int], str]
     Raises:
         InputError: one is damaged; names it.
     """
-    if kind not in _LAYOUTS:
-        return _varying(data, kind, place)
-    size = _LAYOUTS[kind].size
-    groups: dict[tuple[int, bytes, bytes], list[int]] = {}
+    bodies: dict[tuple[str, str], list[tuple[int, int, _State]]] = {}
     for row, message in enumerate(data):
-        begin = _HEAD_BYTES + (len(message) - _HEAD_BYTES - size) // 8 * 8
-        head = message[_HEAD_BYTES + _STAMP_BYTES : max(begin, 0)]
-        groups.setdefault((begin, message[:2], head), []).append(row)
-    return [_samples(data, rows, kind, begin, place) for (begin, _, _), rows in groups.items()]
+        decoded = decode(_LAYOUTS[kind], message, f"{place(row)}: not a {kind}")
+        if kind == TRACKED:
+            entries = [(decoded, entry) for entry in decoded.objects]
+        elif kind == TRANSFORMS:
+            entries = [(entry, entry) for entry in decoded.transforms]
+        else:
+            entries = [(decoded, decoded)]
+        for header, entry in entries:
+            frame, child, state = _state(entry, kind)
+            body = (header.frame_id if frame else "", child)
+            bodies.setdefault(body, []).append((row, header.stamp, state))
+    return [_joined(*body, states, kind) for body, states in bodies.items()]
 
 
-def _samples(
-    data: Sequence[bytes], rows: list[int], kind: str, begin: int, place: Callable[[int], str]
-) -> Samples:
-    """Return the states in messages whose texts are the same and whose doubles begin at a byte.
-
-    Raises:
-        InputError: they are damaged.
-    """
-    first = data[rows[0]]
-    order = "<" if first[1:2] == b"\1" else ">"
-
-    def numbers(type_of: str, start: int, count: int) -> Any:
-        dtype = np.dtype(order + type_of)
-        end = start + count * dtype.itemsize
-        parts = b"".join([data[row][start:end] for row in rows])
-        return np.frombuffer(parts, dtype).reshape(-1, count).astype(float)
-
-    with guarded(f"{place(rows[0])}: not a {kind}", struct.error, UnicodeDecodeError):
-        texts, end = _texts(first, order, _LAYOUTS[kind].n_strings)
-    behind = end
-    if kind == FIX:  # a status of one byte, and an aligned service of two
-        behind += 3 + (end + 1) % 2
-    if begin != behind + (_HEAD_BYTES - behind) % 8:
-        raise InputError(f"{place(rows[0])}: not a {kind}")
-    n = len(rows)
-    unknown = np.full(n, np.nan)
-    heading = course = height = unknown
-    fix = speed = None
+def _state(entry: Any, kind: str) -> tuple[bool, str, _State]:
+    """Return whether positions are in the frame of the header, the body's name, and its state."""
     if kind == FIX:
-        is_fixed = int.from_bytes(first[end : end + 1], signed=True) >= 0
-        places = numbers("f8", begin, 3)
-        fix, height = np.where(is_fixed, places[:, :2], np.nan), places[:, 2]
-    elif kind == TWIST:
-        x, y = numbers("f8", begin, 2).T
-        speed = np.where(y == 0.0, x, np.hypot(x, y))
-        course = np.where(y == 0.0, np.nan, np.arctan2(y, x))
-    else:
-        pose = numbers("f8", begin, 7)
-        fix, height, heading = pose[:, :2], pose[:, 2], yaw(pose[:, 3:])
-    if kind == ODOMETRY:
-        speed = np.hypot(
-            *numbers("f8", begin + 8 * _BEFORE_LINEAR_COUNT, 2).T
-        )  # in the body frame
-    seconds = numbers("i4", _HEAD_BYTES, 1).astype(np.int64)
-    nanoseconds = numbers("u4", _HEAD_BYTES + 4, 1).astype(np.int64)
-    return Samples(
-        frame=texts[0] if kind not in (FIX, TWIST) else "",
-        child=texts[1] if len(texts) > 1 else "",
-        row=np.array(rows, dtype=np.int64),
-        stamp_ns=(seconds * 10**9 + nanoseconds)[:, 0],
-        fix=fix,
-        heading=heading,
-        height=height,
-        speed=speed,
-        course=course,
-        size=np.full(2, np.nan),
-    )
-
-
-def _texts(message: bytes, order: str, count: int) -> tuple[list[str], int]:
-    """Return the first texts after a stamp, and the byte behind them.
-
-    Raises:
-        struct.error: the message is shorter.
-        UnicodeDecodeError: a text is damaged.
-    """
-    end = _HEAD_BYTES + _STAMP_BYTES
-    texts = []
-    for _ in range(count):
-        end += -end % 4
-        (length,) = struct.unpack_from(f"{order}I", message, end)
-        texts.append(message[end + 4 : end + 3 + length].decode())
-        end += 4 + length
-    return texts, end
-
-
-class _State(NamedTuple):
-    """The state of a body in one message; see `Samples`."""
-
-    row: int
-    stamp_ns: int
-    x: float
-    y: float
-    heading: float
-    height: float
-    speed: float = math.nan
-    length: float = math.nan
-    width: float = math.nan
-
-
-def _varying(data: Sequence[bytes], kind: str, place: Callable[[int], str]) -> list[Samples]:
-    """Return the states of each body in messages with lists of bodies.
-
-    Raises:
-        InputError: one is damaged; names it.
-    """
-    store = type_store()
-    states: dict[tuple[str, str], list[_State]] = {}
-    labels: dict[tuple[str, str], list[str]] = {}
-    for row, message in enumerate(data):
-        with guarded(f"{place(row)}: not a {kind}"):
-            decoded = store.deserialize_cdr(message, kind)
-        for entry in decoded.objects if kind == TRACKED else decoded.transforms:
-            header = decoded.header if kind == TRACKED else entry.header
-            stamp_ns = header.stamp.sec * 10**9 + header.stamp.nanosec
-            if kind == TRACKED:
-                child, label, values = _object(entry)
-                labels.setdefault((header.frame_id, child), []).append(label)
-            else:
-                child, moved = entry.child_frame_id, entry.transform.translation
-                values = (moved.x, moved.y, _yaw(entry.transform.rotation), moved.z)
-            states.setdefault((header.frame_id, child), []).append(_State(row, stamp_ns, *values))
-    return [
-        _joined(*body, entries, kind == TRACKED, labels.get(body, [""]))
-        for body, entries in states.items()
-    ]
+        latitude, longitude, height = entry.place.tolist()
+        if entry.status < 0:
+            latitude = longitude = math.nan
+        return False, "", _State((latitude, longitude, height, *(math.nan,) * 4))
+    if kind == TWIST:
+        x, y = entry.twist[:2].tolist()
+        speed, course = (x, math.nan) if y == 0.0 else (np.hypot(x, y), np.arctan2(y, x))
+        return False, "", _State((math.nan,) * 7, speed, course)
+    pose = entry.pose.tolist()
+    if kind == TRACKED:
+        return True, bytes(entry.id).hex(), _object(entry, pose)
+    speed = np.hypot(*entry.twist[:2]) if kind == ODOMETRY else math.nan  # in the body frame
+    return True, getattr(entry, "child", ""), _State(pose, speed)
 
 
 def _joined(
-    frame: str, child: str, states: Sequence[_State], has_speed: bool, labels: Sequence[str]
+    frame: str, child: str, states: Sequence[tuple[int, int, _State]], kind: str
 ) -> Samples:
     """Return the states of one body."""
-    values = np.array([state[2:] for state in states], dtype=float)
+    row, stamp_ns = np.array([state[:2] for state in states], dtype=np.int64).T
+    bodies = [body for _, _, body in states]
+    poses = np.array([body.pose for body in bodies], dtype=float)
+    speed, course, turn = np.array([body[1:4] for body in bodies], dtype=float).T
     return Samples(
         frame,
         child,
-        row=np.array([state.row for state in states], dtype=np.int64),
-        stamp_ns=np.array([state.stamp_ns for state in states], dtype=np.int64),
-        fix=values[:, :2],
-        heading=values[:, 2],
-        height=values[:, 3],
-        speed=values[:, 4] if has_speed else None,
-        course=np.full(len(values), np.nan),
-        size=np.median(values[:, 5:], axis=0),
-        kind=max(labels, key=labels.count),
+        row,
+        stamp_ns,
+        fix=None if kind == TWIST else poses[:, :2],
+        heading=yaw(poses[:, 3:]) + turn,
+        height=poses[:, 2],
+        speed=speed if kind in (TWIST, ODOMETRY, TRACKED) else None,
+        course=course,
+        size=np.median([body.size for body in bodies], axis=0),
+        kind=Counter(body.kind for body in bodies).most_common(1)[0][0],
     )
 
 
@@ -276,27 +186,18 @@ def decode_tracks(data: bytes, place: str) -> Encounter:
     return tracks.decode_tracks(data, place)
 
 
-def _yaw(turn: Any) -> float:
-    return float(yaw(np.array([turn.x, turn.y, turn.z, turn.w])))
-
-
-def _object(entry: Any) -> tuple[str, str, tuple[float, ...]]:
-    """Return id, kind, and x, y, heading, height, speed, length and width of a tracked object."""
-    likely = max(entry.classification, key=attrgetter("probability"), default=None)
-    label = int(likely.label) if likely is not None else 0
-    pose = entry.kinematics.pose_with_covariance.pose
-    linear = entry.kinematics.twist_with_covariance.twist.linear
-    heading = _yaw(pose.orientation)
-    orientation = int(entry.kinematics.orientation_availability)
-    if orientation == _Orientation.UNAVAILABLE or (
-        orientation == _Orientation.SIGN_UNKNOWN and abs(linear.x) < _MIN_DIRECTION_MPS
+def _object(entry: Any, pose: Sequence[float]) -> _State:
+    """Return the state of a tracked object."""
+    likely = max(entry.classes, key=attrgetter("probability"), default=None)
+    label = likely.label if likely is not None else 0
+    x, y = entry.twist[:2].tolist()
+    turn = 0.0
+    if entry.orientation == _Orientation.UNAVAILABLE or (
+        entry.orientation == _Orientation.SIGN_UNKNOWN and abs(x) < _MIN_DIRECTION_MPS
     ):
-        heading = math.nan
-    elif orientation == _Orientation.SIGN_UNKNOWN and linear.x < 0.0:
-        heading += math.pi
-    name = bytes(np.asarray(entry.object_id.uuid, dtype=np.uint8)).hex()
+        turn = math.nan
+    elif entry.orientation == _Orientation.SIGN_UNKNOWN and x < 0.0:
+        turn = math.pi
+    length, width, _ = entry.shape.dimensions.tolist()
     kind = KINDS[label] if label < len(KINDS) else KINDS[0]
-    size = entry.shape.dimensions
-    speed = math.hypot(linear.x, linear.y)
-    state = (pose.position.x, pose.position.y, heading, pose.position.z, speed, size.x, size.y)
-    return name, kind, state
+    return _State(pose, math.hypot(x, y), math.nan, turn, (length, width), kind)
