@@ -50,24 +50,9 @@ def once(
 
 
 @pytest.fixture(scope="session")
-def made_crashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder laid out as the one of files that once broke a reader, made here with the same faults."""
-    from fuzzing import broken
-
-    return made_once(tmp_path_factory, "made_crashes", broken.write)
-
-
-@pytest.fixture(scope="session")
 def data() -> Path:
     """The folder of recorded data; whoever uses it is marked `recorded`."""
     return recorded_folder(DATA)
-
-
-@pytest.fixture
-def file(request: pytest.FixtureRequest) -> Path:
-    """One of them, of `crash_files`: made here if its path is relative."""
-    path: Path = request.param
-    return path if path.is_absolute() else request.getfixturevalue("made_crashes") / path
 
 
 untimed = settings(
@@ -91,7 +76,7 @@ def browser() -> Iterator[object]:
 
 LONGEST = """
 browser generate_action traffic loss live_segmentation recorder over_dds demo_bag twins node_options
-under_load requests_over_dds maps frames bad_tracks launching diagnostics signals suites restart preview off_road reacting search
+under_load requests_over_dds maps frames bad_tracks launching diagnostics signals restart preview off_road reacting search
 batch suitable_roads recorded_encounters packaging pages same_encounters tasks asked_states cli cli_out library_alone every_cpu
 service_calls streams mistakes ros_parameters first_start examples plugin paper benchmarks fuzz fit
 """  # of the files of tests, longest first, so that none is left alone with one at the end

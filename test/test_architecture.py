@@ -125,7 +125,7 @@ def rooms_imported() -> dict[str, set[str]]:
     return found
 
 
-def test_no_room_imports_what_stands_behind_it():
+def test_rooms_import_only_downwards():
     found = rooms_imported()
     assert not [
         (name, other)
@@ -135,7 +135,7 @@ def test_no_room_imports_what_stands_behind_it():
     ]
 
 
-def test_no_stage_imports_what_stands_behind_it():
+def test_stages_import_only_downwards():
     for path in (path for path in (PACKAGE / "method").rglob("*.py") if stage(path) != "__init__"):
         parts = [name.split(".") for name in imported(path)]
         used = {
@@ -156,7 +156,7 @@ def test_every_concept_has_one_home():
     assert not homes
 
 
-def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
+def test_conventions_stand_on_types():
     """Bags and nodes alone make and read messages, which know of nothing but the types."""
     for path in PYTHON_FILES:
         names = [name.split(".") for name in imported(path)]
@@ -168,7 +168,7 @@ def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
             assert "msg_conventions" not in {parts[0] for parts in names}, path
 
 
-def test_no_modules_import_each_other_in_a_circle():
+def test_modules_form_no_circle():
     """Imports inside of functions and those for type checkers count; the public names are looked up lazily, and do not."""
     files = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
@@ -184,13 +184,13 @@ def test_no_modules_import_each_other_in_a_circle():
     TopologicalSorter(graph).prepare()  # a CycleError names the circle
 
 
-def test_rclpy_is_imported_only_in_the_nodes():
+def test_rclpy_stays_in_the_nodes():
     for path in PYTHON_FILES:
         if PACKAGE / "ros" not in path.parents:
             assert not {name for name in imported(path) if name.split(".")[0] == "rclpy"}, path
 
 
-def test_the_command_line_loads_no_library_before_a_command_needs_it():
+def test_command_line_loads_lazily():
     """Else `scenario-gen --help` takes seconds."""
     heavy = {
         "numpy",
@@ -216,7 +216,7 @@ def test_no_file_needs_a_map():
         assert len(path.read_text().splitlines()) <= 500, path
 
 
-def test_nothing_of_this_machine_and_no_registry_is_named():
+def test_tracked_text_leaks_nothing():
     """Tracked text names no absolute home or work path and no package registry's host."""
     files = subprocess.run(
         ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
@@ -244,7 +244,7 @@ READS_TEXT = re.compile(
 )
 
 
-def test_logic_reads_kinds_and_attributes_not_the_wording_of_notes_and_errors():
+def test_logic_reads_kinds_not_wording():
     found = [
         f"{path.relative_to(ROOT)}:{number}"
         for path in PYTHON_FILES

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from support.given import answer, Given
 
-from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation import MEASURED_SCENARIOS
@@ -19,9 +18,7 @@ from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.sampling import sampler
 from scenario_gen.method.sampling.sampler import (
     BLOCK_CANDIDATES,
-    DIRECTED_SLOT,
     index_of,
-    LEVEL_CANDIDATES,
     LEVELS,
     place_of,
 )
@@ -41,18 +38,12 @@ def made(chain, count):
 
 
 @given(st.integers(0, len(LEVELS) - 1), st.integers(0, 1 << 40))
-def test_an_index_is_wide_enough_for_any_candidate(level, candidate):
+def test_index_is_wide_enough(level, candidate):
     index = index_of(level, candidate)
     assert place_of(index) == (level, candidate) and index < 1 << 63
 
 
-def test_an_index_of_no_candidate_is_refused():
-    for index in (-1, (DIRECTED_SLOT + 1) * LEVEL_CANDIDATES):
-        with pytest.raises(InputError, match="scenarios/info"):
-            place_of(index)
-
-
-def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
+def test_level_has_unlimited_candidates(chain, monkeypatch):
     """Beyond LEVEL_CANDIDATES candidates numbering goes on behind the last level, and each one can be had again."""
     plain = made(chain, 200)
     monkeypatch.setattr(sampler, "LEVEL_CANDIDATES", 2 * BLOCK_CANDIDATES)
@@ -67,7 +58,7 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
 
 
 @given(st.integers(MEASURED_SCENARIOS + 1, 10**12))
-def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
+def test_large_sets_are_measured_evenly(size):
     taken = np.array(measured(range(size)))
     assert len(taken) == len(set(taken)) == MEASURED_SCENARIOS
     assert taken[0] == 0 and taken[-1] == size - 1

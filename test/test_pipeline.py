@@ -7,11 +7,8 @@ from io import StringIO
 import json
 from pathlib import Path
 
-from markupsafe import escape
-import numpy as np
 import pytest
 from rich.console import Console
-from support.reaction_scenes import answering, lane_encounter, wander
 
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -20,7 +17,6 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50)
 
@@ -48,7 +44,7 @@ def written(case, folder):
     return (folder / "report.html").read_text(encoding="utf-8"), figures
 
 
-def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):
+def test_reactions_are_shown_everywhere(case, encounter, tmp_path):
     said = "vehicle 2 slows for vehicle 1 and passes 1.7 s behind it"
     config = PipelineConfig(evaluation=QUICK, sampling=SamplingConfig(reactions="none"))
     free = generate(encounter, "t_intersection", config, count=2, seed=3)
@@ -68,26 +64,3 @@ def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter
         assert (edge["who"], edge["whom"], edge["kept"]) == ("2", "1", kept) and edge[
             "lag"
         ] == pytest.approx(0.4, abs=0.05)
-
-
-def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path):
-    """A follower that is asked to start much nearer to its leader than it ever drove."""
-    leader = wander(np.random.default_rng(3), 200)
-    lane, config = (
-        lane_encounter(leader, answering(leader, 1.2, 0.9)),
-        PipelineConfig(evaluation=QUICK),
-    )
-    x, y, yaw, _ = (
-        generate(lane, "corridor", config, count=1, seed=3).fit.requested.start[1].tolist()
-    )
-    asked = Request(starts=f"2: {x + 13.0:.2f} {y:.2f} {yaw:.3f}")
-    made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
-    (sentence,) = made.lost_reactions
-    assert "vehicle 2: comes within " in sentence and made.generated.reactions == ()
-    page, figures = written(made, tmp_path)
-    text = printed(made)
-    assert sentence in text and "and answers its speed after 1.2 s: not enforced" in text
-    assert (
-        page.count(str(escape(sentence))) > 1 and "not enforced" in page
-    )  # beside the reaction, and in accounts
-    assert figures["adaptations"] == list(map(str, made.generated.adaptations))

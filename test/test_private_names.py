@@ -33,7 +33,7 @@ def private_imports(tree: ast.Module) -> list[str]:
     ]
 
 
-def test_no_private_module_of_another_package_is_used():
+def test_private_modules_are_not_used():
     code = (
         "from numba.core import caching; import os._x, numpy as np; from a import _b, __version__"
     )

@@ -81,7 +81,7 @@ def at_the_recorded_pace(case: GenerationResult) -> tuple[GenerationResult, Pipe
 
 
 @pytest.mark.parametrize("path", LOGS)
-def test_generates_valid_scenarios_on_at_least_two_roads(path):
+def test_scenarios_are_valid_on_two_roads(path):
     if "four_vehicles" in path.stem:
         pytest.xfail("four vehicles for 33 s: 4 of 5 scenarios from 800 candidates")
     (encounter,) = read_log(path).encounters
@@ -100,7 +100,7 @@ def test_generates_valid_scenarios_on_at_least_two_roads(path):
 
 
 @pytest.mark.parametrize("own", OWN_MAPS)
-def test_ngsim_encounters_run_on_their_own_map(own, data):
+def test_encounters_run_on_own_map(own, data):
     place = own.split("-")[0].removeprefix("USA_")
     path = next(data.glob(f"trajectories/ngsim_commonroad/encounter_*{place}*.csv"))
     (encounter,) = read_log(path).encounters

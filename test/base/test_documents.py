@@ -5,59 +5,21 @@
 
 import os
 
-from fuzzing.crash_files import crash_files, is_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from scenario_gen.base.documents import parse_json, parse_yaml, read_text, shown
+from scenario_gen.base.documents import parse_json, read_text, shown
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import assigned, flatten, loaded, read_parameter_file
+from scenario_gen.base.parameters import assigned, flatten, read_parameter_file
 from scenario_gen.pipeline import PipelineConfig
 
 NAMES = sorted(flatten(PipelineConfig()))
 TEXTS = [
-    *(
-        "'",
-        "...",
-        "!!timestamp x",
-        "2024-99-99",
-        "<<: *a",
-        "%YAML 9.9",
-        "!!pairs [a]",
-        "!!omap [a]",
-        "\t",
-        "!!bool x",
-        "*a",
-        "%s%n",
-    ),
-    *(
-        "a: &a {b: *a}",
-        "{a: [}",
-        "!<tag:yaml.org,2002:python/name:os.system> x",
-        "\x1b",
-        "!!float x",
-        "!!map [a]",
-        "!!set {a}",
-    ),
-    *("!!binary a", '!!int ""'),
+    *("'", "...", "!!timestamp x", "<<: *a", "%YAML 9.9", "!!pairs [a]", "\t", "!!bool x", "%s%n"),
+    *("a: &a {b: *a}", "!<tag:yaml.org,2002:python/name:os.system> x", "!!float x", '!!int ""'),
+    *("0x" + "f" * 5000, "? [a]\n: b", "[" * 5000, "a" * 2_000_000, "\ud800", "--- a\n--- b"),
 ]
-TEXTS += [
-    "9" * 5000,
-    "0x" + "f" * 5000,
-    "? [a]\n: b",
-    "[" * 5000,
-    "a" * 2_000_000,
-    "\ud800",
-    "--- a\n--- b",
-]
-
-
-@pytest.mark.parametrize(
-    "file", crash_files("params/*", "params_*", "deep.yaml", "map_alias*"), indirect=True
-)
-def test_a_broken_parameter_file_is_named(file):
-    is_refused(lambda: loaded(PipelineConfig(), file), str(file))
 
 
 @pytest.mark.parametrize("text", TEXTS, ids=range(len(TEXTS)))
@@ -77,7 +39,7 @@ def test_set_says_what_is_wrong(text):
     ),
 )
 @settings(max_examples=15)
-def test_any_text_is_a_valid_value_or_a_clear_error(name, text):
+def test_any_text_is_valid_or_refused(name, text):
     try:
         config = assigned(PipelineConfig(), f"{name}={text}")
     except InputError as error:
@@ -101,21 +63,13 @@ def test_any_text_is_a_valid_value_or_a_clear_error(name, text):
         "null",
     ],
 )
-def test_a_file_of_another_form_is_refused(tmp_path, text):
+def test_file_of_another_form_is_refused(tmp_path, text):
     (tmp_path / "p.yaml").write_text(text)
     with pytest.raises(InputError, match=r"p\.yaml: not a parameter file"):
         read_parameter_file(tmp_path / "p.yaml")
 
 
-def test_plain_values_are_read_as_they_are_written():
-    assert parse_yaml("a: [1, 2.5, true, null, x, '1']\n<<: 3\n2024-01-01: 1_000\n", "x") == {
-        "a": [1, 2.5, True, None, "x", "1"],
-        "<<": 3,
-        "2024-01-01": 1000,
-    }
-
-
-def test_json_keeps_its_schema_and_the_path_is_named():
+def test_json_schema_errors_name_the_path():
     schema = {
         "type": "object",
         "properties": {"a": {"type": "array", "items": {"type": "number"}}},

@@ -59,38 +59,3 @@ def test_the_current_folder_is_not_searched(tmp_path, program):
     )
     assert not (tmp_path / "run").exists(), (tmp_path / "run").read_text()
     assert "Traceback" not in result.stderr, result.stderr
-
-
-SETTINGS = {
-    ".numba_config.yaml": "chrome_trace: trace.json\ncache_dir: kernels\n",
-    "matplotlibrc": "backend: module://evil\n",
-    "dask.yaml": "temporary-directory: elsewhere\n",
-    ".duckdbrc": "bad\n",
-    ".env": "OPENBLAS_NUM_THREADS=none\n",
-}
-
-
-def test_settings_in_the_current_folder_are_not_read(tmp_path):
-    for name, text in SETTINGS.items():
-        (tmp_path / name).write_text(text)
-    program = (
-        "from scenario_gen import generate, read_log\n"
-        "from scenario_gen.logs.synthetic import bundled\n"
-        "from scenario_gen.numerics.numba_import import numba\n"
-        "made = generate(read_log(bundled('c')).encounters[0], 'straight', count=1)\n"
-        "made.generated[0].plot()\n"
-        "numba.njit(lambda x: x + 1)(1)\n"
-        "print(numba.config.CHROME_TRACE, numba.config.CACHE_DIR)\n"
-    )
-    result = subprocess.run(
-        [sys.executable, "-P", "-c", program],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    assert "trace.json" not in result.stdout and "kernels" not in result.stdout
-    assert {path.name for path in tmp_path.iterdir()} == set(SETTINGS)

@@ -41,7 +41,7 @@ def test_what_logs_call_types(word, name):
     assert type_called(word) == name
 
 
-def test_joint_names_say_types_and_older_ones_are_read():
+def test_joint_names_carry_types():
     bicycle, car = Vehicle("b", 1.8, 0.65, "bicycle"), Vehicle("c", 4.8, 1.9)
     assert joint_names((bicycle, car)) == (
         "b:1.8x0.65:bicycle",
@@ -56,7 +56,7 @@ def test_joint_names_say_types_and_older_ones_are_read():
         vehicle_of("s:1.0x0.5:hoverboard")
 
 
-def test_each_type_has_limits_of_its_own_to_set():
+def test_each_type_has_its_limits():
     assert [entry.name for entry in fields(TypeLimits)] == [*VEHICLE_TYPES.built_in, "plugins"]
     config = assigned(PipelineConfig(), "limits.bus.max_speed=20")
     assert config.limits.of("bus").max_speed == 20.0 and config.limits.of("car") == Dynamics()

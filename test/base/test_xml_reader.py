@@ -56,18 +56,6 @@ def test_sizes_are_bounded(tmp_path, monkeypatch):
         read_xml(path, "m")
 
 
-def test_depth_is_bounded():
-    with pytest.raises(InputError, match="Excessive depth"):
-        parse_xml(b"<a>" * 300 + b"</a>" * 300, "m")
-
-
-def test_a_declaration_below_a_comment_is_accepted(tmp_path):
-    path = tmp_path / "map.xml"
-    path.write_text("<!-- licence -->\n<?xml version='1.0'?>\n<a>\n<b/></a>")
-
-    assert read_xml(path, "m").child("b").sourceline == 4
-
-
 @pytest.mark.parametrize(
     ("attribute", "message"),
     [

@@ -48,18 +48,6 @@ def test_lengths_ends_and_limits_hold(factors, depth, first):
     assert acceleration.min() >= -limits.max_deceleration - 1e-5
 
 
-def test_chained_law_would_ring_and_this_does_not():
-    template = np.full(201, 10.0)
-    lengths = driven(template) * np.array([1.02, 0.98, 1.02, 0.98])
-    chained = [10.0]
-    for length, duration in zip(lengths, np.diff(CLOCK), strict=True):
-        chained.append(2.0 * length / duration - chained[-1])
-    knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
-    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(knots.knot[None], lengths[None])
-    assert ok[0]
-    assert np.abs(speed[0] - 10.0).max() < 0.5 < np.abs(np.array(chained) - 10.0).max() + 0.1
-
-
 def test_wait_inside_a_primitive_stands_exactly():
     template = np.interp(TIME, [0.0, 5.0, 7.4, 15.3, 18.0, 20.0], [6.0, 6.0, 0.0, 0.0, 6.0, 6.0])
     knots = speed_knots(
@@ -73,17 +61,3 @@ def test_wait_inside_a_primitive_stands_exactly():
     assert (v == 0.0).all()
     assert np.ptp(at) == 0.0
     assert profile.state(CLOCK)[0] == pytest.approx([0.0, 35.0, 38.0, 38.0, 58.5], abs=1e-5)
-
-
-def test_impossible_lengths_are_refused_and_slid():
-    knots = speed_knots(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0))
-    qp = SpeedProfileQP(knots, Dynamics().planned)
-    wrong = driven(dip()) + np.array([70.0, -20.0, -50.0, 0.0])
-    assert not qp.solve(knots.knot[None], wrong[None])[1][0]
-    speed, ok, slid = qp.slide(knots.knot[None], wrong[None])
-    assert ok[0]
-    reached = SpeedProfile(knots.knot, speed[0]).state(CLOCK)[0][1:]
-    assert reached == pytest.approx(np.cumsum(wrong) + slid[0], abs=1e-5)
-    assert slid[0][-1] == pytest.approx(0.0, abs=1e-5)
-    assert 1.0 < np.abs(slid).max() < 100.0
-    assert not qp.slide(knots.knot[None], 10.0 * wrong[None])[1][0]

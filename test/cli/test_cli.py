@@ -15,7 +15,7 @@ LOG = bundled("c")
 QUICK = ("--road", "straight", "--count", "2", "--set", "evaluation.resamples=20")
 
 
-def test_generate_leaves_bag_report_and_figures_and_is_reproducible(ran, made, tmp_path):
+def test_generate_is_complete_and_reproducible(ran, made, tmp_path):
     code, said, err = ran("generate", LOG, *QUICK, "--seed", 7, "--out", "out", "--json")
     answer = json.loads(said, parse_constant=pytest.fail)
     assert (

@@ -36,7 +36,7 @@ def files(folder):
     }
 
 
-def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
+def test_lookalikes_are_no_earlier_result(run, made, tmp_path):
     """The two that once were lost: a recording, for a scenario of its own, and notes beside a page called report.html."""
     bag = tmp_path / "generated_bag"
     shutil.copytree(made / "bag", bag)
@@ -51,31 +51,6 @@ def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
         and "report.html" in said
         and (tmp_path / "page" / "report.html").read_text() == "a report of mine"
     )
-
-
-def test_inputs_stay(run, made, tmp_path):
-    shutil.copytree(made, tmp_path / "o2")
-    shutil.copytree(bundled("c"), tmp_path / "o2" / "log")
-    bag = tmp_path / "o2" / "bag"
-    before = files(tmp_path)
-    for words in (
-        ("generate", "o2/log", "--road", "straight", "--out", "o2"),
-        (
-            "generate",
-            bundled("c"),
-            "--road",
-            "o2/map.yaml",
-            "--params",
-            "o2/p.yaml",
-            "--out",
-            "o2",
-        ),
-        ("evaluate", bag, "--out", "o2"),
-        ("evaluate", bag, "--out", bag),
-    ):
-        code, said = run(*words)
-        assert code == 2 and "error:" in said, words
-        assert files(tmp_path) == before, words
 
 
 NAME = "[red]a\x1b[31m\n*b*\u202e[/]"
@@ -123,7 +98,7 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
         (OSError("no number, no name"), "no number, no name"),
     ],
 )
-def test_whatever_the_system_says_is_one_message(run, monkeypatch, error, words):
+def test_system_errors_are_one_message(run, monkeypatch, error, words):
     def broken(*_):
         raise error
 
@@ -145,7 +120,7 @@ def started(tmp_path, *words, **options):
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
 )
-def test_a_signal_ends_it_with_its_code_and_leaves_nothing(made, tmp_path, number):
+def test_signal_ends_it_and_leaves_nothing(made, tmp_path, number):
     shutil.copytree(made, tmp_path / "out")
     before = files(tmp_path)
     process = started(tmp_path, *GENERATE[:5], 10_000, "--out", "out")
@@ -174,7 +149,7 @@ def test_a_signal_while_the_libraries_load(tmp_path):
     assert process.returncode == -signal.SIGINT and said.strip() == "stopped by SIGINT"
 
 
-def test_a_full_standard_output_is_an_error_and_a_closed_one_is_quiet(tmp_path):
+def test_full_and_closed_output_are_handled(tmp_path):
     with Path("/dev/full").open("w") as full:
         command = [sys.executable, "-m", "scenario_gen", "--parameters"]
         ended = subprocess.run(

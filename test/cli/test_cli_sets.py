@@ -12,14 +12,7 @@ from scenario_gen.types import Recorded
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def test_a_long_run_is_announced_before_it(run, tmp_path, monkeypatch):
-    words = ("generate", EXAMPLES / "my_log.csv", "--road", "four_way", "--count", 1)
-    assert "or more" not in run(*words, "--out", tmp_path / "short")[1]
-    monkeypatch.setattr("scenario_gen.cli.folder.LONG_RUN_S", 0.1)
-    assert "1 encounters on roads take 0.0 min or more" in run(*words, "--out", tmp_path / "b")[1]
-
-
-def test_a_log_whose_name_has_a_plus_is_a_recording(run, tmp_path):
+def test_plus_in_a_name_is_recorded(run, tmp_path):
     log = tmp_path / "north + south.csv"
     copyfile(EXAMPLES / "my_log.csv", log)
     out = tmp_path / "out"

@@ -10,7 +10,7 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.cli.demo import compare_with_nodes
 
 
-def test_scenarios_in_which_a_vehicle_leaves_early_are_compared_whole(tmp_path):
+def test_early_leavers_are_compared_whole(tmp_path):
     encounter = read_log(bundled("ngsim_two_left_turns")).encounters[0]
     quick = {"evaluation.resamples": 10}
     made, other = (

@@ -12,7 +12,7 @@ from scenario_gen.cli.folder import map_faults
 from scenario_gen.roads import build_road
 
 
-def test_faulty_elements_of_a_map_are_said(tmp_path):
+def test_faulty_map_elements_are_named(tmp_path):
     extra = '<member type="way" ref="1002" role="left"/></relation>'
     (tmp_path / "town.osm").write_text(lanelet2().replace("</relation>", extra, 1))
     case = replace(hand_made_run(), road=build_road(str(tmp_path / "town.osm")))

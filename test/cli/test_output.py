@@ -6,10 +6,8 @@
 import io
 import json
 import shutil
-import sys
 
 import pytest
-from rich.console import Console
 
 from scenario_gen.base.terminal import Terminal
 from scenario_gen.cli import output
@@ -29,7 +27,7 @@ def one_object(text):
         (("--parameters",), "command", "--parameters"),
     ],
 )
-def test_json_is_one_object_and_messages_go_to_standard_error(ran, made, words, key, value):
+def test_json_is_one_object(ran, made, words, key, value):
     words = [word.format(bag=made / "bag", made=made) for word in words]
     code, out, err = ran(*words, "--json")
     answer = one_object(out)
@@ -83,7 +81,7 @@ ROW = (
 
 
 @pytest.mark.parametrize("columns", [3, 11])
-def test_a_table_in_80_columns_cuts_nothing_off(monkeypatch, columns):
+def test_table_in_80_columns_is_whole(monkeypatch, columns):
     monkeypatch.setattr("scenario_gen.base.terminal.Terminal", Narrow)
     Narrow.text = io.StringIO()
     output.print_table(COLUMNS[:columns], [ROW[:columns]], names=3)
@@ -92,9 +90,7 @@ def test_a_table_in_80_columns_cuts_nothing_off(monkeypatch, columns):
     assert all(word in text for word in (*ROW[:columns], *COLUMNS[3:columns]))
 
 
-def test_the_page_of_generate_is_that_of_its_bag_and_another_one_is_written_beside_it(
-    ran, made, tmp_path
-):
+def test_page_of_generate_is_reused(ran, made, tmp_path):
     for bag in (made, made / "bag"):
         _, out, _ = ran("report", bag, "--no-open")
         assert out.strip() == f"report: {made / 'report.html'}"
@@ -102,13 +98,3 @@ def test_the_page_of_generate_is_that_of_its_bag_and_another_one_is_written_besi
     _, out, _ = ran("report", "other")
     assert out.strip().splitlines()[-1] == f"report: {tmp_path / 'other_report' / 'report.html'}"
     assert (tmp_path / "other_report" / "report.html").is_file()
-
-
-def test_a_page_is_opened_where_somebody_looks(monkeypatch, tmp_path):
-    opened = []
-    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
-    monkeypatch.setenv("DISPLAY", ":0")
-    assert not output.open_page(tmp_path / "page.html")
-    monkeypatch.setattr(sys, "stdout", Console(force_terminal=True).file)
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    assert output.open_page(tmp_path / "page.html") and opened[0].startswith("file://")

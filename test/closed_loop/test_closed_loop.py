@@ -50,7 +50,7 @@ def prepared(seed, reactions=False, **config):
     seed=1092, reactions=False
 )  # two with the earliest clock may leave neither each other behind nor the next one
 @example(seed=7114, reactions=False)
-def test_others_never_meet_and_come_to_their_ends_whatever_the_ego_does(seed, reactions):
+def test_others_never_meet_and_always_arrive(seed, reactions):
     scenario, ego, loop = prepared(seed, reactions)
     anything, steps = Anything(seed), len(scenario.time) // 2 + seed % 50
     drive = loop.drive(anything, lambda state: state.step >= steps)
@@ -70,7 +70,7 @@ def test_others_never_meet_and_come_to_their_ends_whatever_the_ego_does(seed, re
 
 @settings(max_examples=EXAMPLES)
 @given(st.integers(0, 10**9), st.sampled_from(["replay", "reactive"]))
-def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
+def test_witness_as_ego_changes_nothing(seed, policy):
     scenario, ego, loop = prepared(seed, policy=policy)
     drive = loop.drive(Witness(scenario, ego), lambda state: state.step >= len(scenario.time) - 1)
     assert np.abs(drive.motion.position - scenario.position).max() < 1e-6
@@ -79,7 +79,7 @@ def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
 
 
 @pytest.mark.parametrize(("yields", "waits"), [("template", True), ("never", False)])
-def test_the_others_wait_for_the_ego_where_the_template_did(yields, waits):
+def test_others_wait_as_in_the_template(yields, waits):
     """The ego went first in the template, but comes late: it stands 25 m before the crossing for 6 s."""
     scenario = crossing()
     loop = ClosedLoop(scenario, 0, config=ClosedLoopConfig(yield_to_ego=yields, patience=1e6))
@@ -93,7 +93,7 @@ def test_the_others_wait_for_the_ego_where_the_template_did(yields, waits):
 
 
 @pytest.mark.parametrize("patience", [2.0, 1e6])
-def test_who_has_waited_long_enough_passes_one_that_the_ego_holds_up(patience):
+def test_patient_vehicle_passes_a_delayed_one(patience):
     """Vehicle 0 crosses before vehicle 1 and is held up by the ego ahead of it: vehicle 1 waits for it, then goes first; all go on."""
     base, time = crossing(), np.arange(150) * PERIOD
     lead = (
@@ -117,7 +117,7 @@ def test_who_has_waited_long_enough_passes_one_that_the_ego_holds_up(patience):
     assert (state.clock[:2] >= scenario.time[-1]).all()
 
 
-def test_the_body_keeps_to_its_limits_and_drives_arcs():
+def test_body_keeps_limits_and_drives_arcs():
     config, limits = ClosedLoopConfig(ego_curvature_rate=20.0), Dynamics()
     state, turn = EgoState(0.0, 0.0, 0.0, 5.0, 0.1), 0.1
     for _ in range(200):
@@ -143,12 +143,12 @@ def test_the_body_keeps_to_its_limits_and_drives_arcs():
         (Pose(500.0, 0.0, 0.0, 0.0), "jumped 500.0 m"),
     ],
 )
-def test_what_is_wrong_with_a_command_is_said(asked, said):
+def test_wrong_command_is_described(asked, said):
     moved = move(EgoState(0.0, 0.0, 0.0, 5.0), asked, ClosedLoopConfig(), Dynamics())
     assert said in moved.fault and np.isfinite(moved.state).all()
 
 
-def test_who_comes_late_and_leaves_early_is_there_for_that_time_only():
+def test_partly_present_vehicles_keep_their_times():
     """Vehicle 1 comes at 3 s and leaves at 9 s; held up by the ego on its place, it comes later."""
     base = crossing()
     present = np.array([[0, 149], [30, 90]])
@@ -187,7 +187,7 @@ class Late(Witness):
         return super().act(replace(seen, time=seen.time + self.begin))
 
 
-def test_limits_of_its_type_bind_the_ego():
+def test_type_limits_bind_the_ego():
     config = assigned(ClosedLoopConfig(), "limits.car.max_acceleration=1.2")
     loop = ClosedLoop(crossing(), 0, config=config)
     state = loop.step(loop.start(), Command(9.0, 0.0))

@@ -45,7 +45,7 @@ def scenario_of(encounter):
 
 
 @pytest.mark.parametrize("queue", (0.0, 4.0))
-def test_a_stream_has_one_gap_at_the_requested_time(stream, queue):
+def test_stream_has_one_gap_on_time(stream, queue):
     encounter = stream.open_at(8.0, queue, 0.1)
     stream_rows = [row for row, name in enumerate(encounter.ids) if name.startswith("1-")]
     found = Situation.of(encounter).conflicts
@@ -62,7 +62,7 @@ def test_a_stream_has_one_gap_at_the_requested_time(stream, queue):
     assert max(np.subtract(entries[1:], exits[:-1])) < CLOSED_S + 0.1  # closed before the gap
 
 
-def test_who_insists_does_not_wait_for_an_ego_that_is_late(stream):
+def test_insisting_vehicle_awaits_no_late_ego(stream):
     loop = ClosedLoop(scenario_of(stream.open_at(8.0, 0.0, 0.1)), 0)
     assert loop.insists.sum() == len(loop.conflicts)
     verdicts = {wait: judge(loop, loop.drive(Departs(wait))) for wait in (3.0, 6.2, 10.0)}
@@ -72,7 +72,7 @@ def test_who_insists_does_not_wait_for_an_ego_that_is_late(stream):
         assert verdicts[wait].collision is not None or verdicts[wait].took_turn
 
 
-def test_who_meets_nobody_after_another_one_has_no_stream():
+def test_vehicle_meeting_nobody_has_no_stream():
     encounter = read_log(bundled("b")).encounters[0]
     with pytest.raises(RefusedError, match="waits for nobody"):
         Stream.of(encounter, Situation.of(encounter).conflicts[0].first)

@@ -58,7 +58,7 @@ def led():
 
 @pytest.mark.parametrize("share", [0.6, 0.3])
 @pytest.mark.parametrize("slot", [False, True])
-def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, share, slot):
+def test_yielder_waits_for_a_delayed_vehicle(led, share, slot):
     """The ego is the one ahead: as a vehicle of the scenario, and in its slot with the witness beside it."""
     early = 0
     for scenario in led:
@@ -81,7 +81,7 @@ def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, sha
     assert early > 0, "without the reaction somebody goes early"
 
 
-def test_it_waits_for_nobody_when_all_drive_as_certified(led):
+def test_nobody_waits_when_driving_as_certified(led):
     for scenario in led:
         last = len(scenario.time) - 1
         drive = ClosedLoop(scenario, "3").drive(
@@ -90,7 +90,7 @@ def test_it_waits_for_nobody_when_all_drive_as_certified(led):
         assert np.abs(drive.motion.position - scenario.position).max() < 1e-6
 
 
-def test_followers_among_the_others_keep_their_distance_to_one_that_the_ego_holds_up():
+def test_followers_keep_distance_to_delayed_leaders():
     made = generated(platoon(4), 3)
     assert len(made.reactions) == 3
     for scenario in made.scenarios:

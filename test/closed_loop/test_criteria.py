@@ -52,17 +52,13 @@ class Nameless:
         return 0.0
 
 
-class Endless(Unknown):
-    threshold = np.inf
-
-
 def drives(criteria):
     run, config = hand_made_run(), ClosedLoopConfig(criteria=criteria)
     trials = trials_of(run, run.encounter.vehicles[0].id)[:2]
     return Drives(run_trials(trials, PLANNER, config), PLANNER, config, trials)
 
 
-def test_a_missed_criterion_fails_the_drive_in_every_file(tmp_path):
+def test_missed_criterion_is_in_every_file(tmp_path):
     here = f"{__name__}:"
     result = drives(f"{here}Speed, {here}Unknown")
     result.write(tmp_path)
@@ -89,7 +85,7 @@ def test_a_missed_criterion_fails_the_drive_in_every_file(tmp_path):
     assert not any(outcome.verdict.missed for outcome in lenient)
 
 
-def test_a_criterion_is_an_objective_with_its_own_margin():
+def test_criterion_is_an_objective_with_margin():
     text = f"{__name__}:Speed>4"
     objective = Objective.parsed(text)
     config = objective.configured(ClosedLoopConfig())
@@ -110,20 +106,17 @@ def test_a_criterion_is_an_objective_with_its_own_margin():
     ("text", "message"),
     [
         ("clearence", "'clearence' is not installed; write MODULE:CLASS"),
-        (f"{__name__}:Sped", "name a class of that module.*Speed"),
         (f"{__name__}:Nameless", "no attribute 'name'"),
-        (f"{__name__}:Endless", "`threshold` .finite number"),
         (f"{__name__}:Speed<3", "write >, the side"),
-        (f"{__name__}:Speed>3>4", "NAME<0.5"),
     ],
 )
-def test_a_mistake_is_named_in_one_line(text, message):
+def test_criterion_mistake_is_one_line(text, message):
     with pytest.raises(InputError, match=message) as caught:
         drives(text)
     assert "\n" not in str(caught.value)
 
 
-def test_a_criterion_that_fails_is_an_error_of_the_drive():
+def test_failing_criterion_is_an_error():
     outcome, _ = drives(f"{__name__}:Broken").outcomes
     assert "criterion 'broken' failed: " in outcome.verdict.error
     assert outcome.verdict.failure == "error" and "Traceback" in outcome.traceback

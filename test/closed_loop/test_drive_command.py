@@ -6,7 +6,6 @@
 from contextlib import suppress
 import json
 import os
-from pathlib import Path
 import re
 import subprocess
 import sys
@@ -22,7 +21,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive, drive_bags, DriveRequest
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.planners import IdmFollower
 from scenario_gen.closed_loop.results import as_junit, Drives
 from scenario_gen.closed_loop.trials import read_trials
@@ -35,7 +34,7 @@ def bag(tmp_path_factory):
     return write_recording(tmp_path_factory.mktemp("driven") / "bag", hand_made_run())
 
 
-def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
+def test_bars_decide_the_exit_code(bag, tmp_path):
     for bar in (0.0, 1.0):
         words = [
             "drive",
@@ -56,6 +55,7 @@ def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
             for word in ("--set", value)
         ]
         told = CliRunner().invoke(app, [*words, *sets])
+        assert "the non-reactive baseline passes" in told.output
         said = json.loads((tmp_path / "out" / "drives.json").read_text())
         reached = said["summary"]["goals"]["share"] >= bar
         assert (
@@ -68,7 +68,7 @@ def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
         ).is_file()
 
 
-def test_the_library_drives_results_and_bags_as_the_command(bag):
+def test_library_drives_as_the_command(bag):
     made = hand_made_run()
     by_bag, by_result = drive(bag, PLANNER, "1"), drive(made, IdmFollower, "1")
     assert repr(by_bag) == repr(by_result) and len(by_bag.outcomes) == len(made)
@@ -118,12 +118,6 @@ class Forward(Still):
         return Command(1.0, 0.0)
 
 
-class Forks(Still):
-    def act(self, seen):
-        if seen.time == 0.0:
-            os.fork()
-
-
 class Hangs(Still):
     """Stands in the first scenario, and never answers in the second; it catches what it can."""
 
@@ -147,11 +141,6 @@ class Slow(Still):
     def act(self, seen):
         if seen.time == 0.0:
             time.sleep(0.05)
-
-
-class Nowhere(Still):
-    def act(self, seen):
-        return Pose(1e300, 0.0, 0.0, 1e300)
 
 
 class FailsInTheSecond(Still):
@@ -190,7 +179,7 @@ def driven(bag, out, planner, count=2, workers=1, sets=()):
         ("NeverMade", 1, r"RuntimeError: no model here \(test_drive_command.py, line \d+\)"),
     ],
 )
-def test_a_planner_that_fails_is_an_error_of_each_scenario(bag, tmp_path, planner, workers, said):
+def test_failing_planner_fails_each_scenario(bag, tmp_path, planner, workers, said):
     result, cases = driven(bag, tmp_path / "out", planner, workers=workers)
     assert "2 drives ended with an error" in result.broken[-1]
     assert [re.search(said, case.find("error").get("message")) is None for case in cases] == [
@@ -200,7 +189,7 @@ def test_a_planner_that_fails_is_an_error_of_each_scenario(bag, tmp_path, planne
     assert all("Traceback" in case.find("error").text for case in cases)
 
 
-def test_after_an_error_the_rest_is_driven_and_no_print_gets_into_the_output(bag, tmp_path, capfd):
+def test_error_does_not_stop_the_rest(bag, tmp_path, capfd):
     FailsInTheSecond.drives = 0
     result, cases = driven(bag, tmp_path / "out", "FailsInTheSecond", count=3)
     (drives,) = result.drives
@@ -216,7 +205,7 @@ def test_after_an_error_the_rest_is_driven_and_no_print_gets_into_the_output(bag
     assert "a planner prints" in printed.err and "prints" not in printed.out
 
 
-def test_state_between_drives_is_found_by_a_repetition(bag, tmp_path):
+def test_repetition_finds_state_between_drives(bag, tmp_path):
     FailsInTheSecond.drives = 5
     result, _ = driven(bag, tmp_path / "out", "FailsInTheSecond", sets=["repeat=2"])
     assert "2 of 2 drives differ when repeated" in result.broken[-1]
@@ -224,13 +213,13 @@ def test_state_between_drives_is_found_by_a_repetition(bag, tmp_path):
     assert not any("differ" in sentence for sentence in result.broken)
 
 
-def test_a_planner_that_ends_its_process_ends_the_command(bag, tmp_path):
+def test_planner_ending_its_process_ends_command(bag, tmp_path):
     with pytest.raises(InputError, match="ended after 0 of 2 drives"):
         driven(bag, tmp_path / "out", "LeavesAtOnce", workers=2)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_planner_that_hangs_is_ended_and_the_error_says_where(bag, tmp_path):
+def test_hanging_planner_is_ended_and_located(bag, tmp_path):
     Hangs.drives = 0
     result, cases = driven(bag, tmp_path / "out", "Hangs", sets=["drive_time=5"])
     assert "not finished in 5 s" in result.drives[0].outcomes[1].verdict.error
@@ -238,7 +227,7 @@ def test_a_planner_that_hangs_is_ended_and_the_error_says_where(bag, tmp_path):
 
 
 @pytest.mark.long
-def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
+def test_hanging_compiled_code_ends_its_process(bag, tmp_path):
     with pytest.raises(
         InputError,
         match=r"ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time",
@@ -253,7 +242,7 @@ def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
         drive_bags(request, tmp_path)
 
 
-def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_path):
+def test_slow_decisions_are_counted_only(bag, tmp_path):
     known = {}
     for planner in ("Slow", "Still"):
         sets = ["step=0.04", "overtime=1.0"]
@@ -271,62 +260,12 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
     assert known["Slow"] | {"planner": ""} == known["Still"] | {"planner": ""}
 
 
-@pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
-def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
-    drive_bags(
-        DriveRequest([bag], [f"{__name__}:{planner}"], count=1, workers=1),
-        tmp_path / "out",
-    )
-    (drive,) = json.loads((tmp_path / "out" / "drives.json").read_text())["drives"]
-    assert drive["faults"] > 0 and not drive["passed"]
-
-
-def test_junit_is_xml_whatever_things_are_called():
+def test_junit_is_xml_for_any_name():
     suite = ElementTree.fromstring(as_junit(Drives([], "no\x01 name\ufffe", ClosedLoopConfig())))
     assert suite.get("name") == r"no\x01 name\ufffe" and suite.get("tests") == "0"
 
 
-BUSY = """
-import os, pathlib
-class Busy:
-    def reset(self, task):
-        pathlib.Path(f"{os.getpid()}.busy").touch()
-    def act(self, seen):
-        sum(range(10**15))  # compiled, and no other thread comes in between
-"""
-
-
-@pytest.mark.long
-def test_processes_of_a_killed_drive_end_with_it_whatever_they_are_at(bag, tmp_path):
-    (tmp_path / "busy.py").write_text(BUSY)
-    words = [
-        sys.executable,
-        "-m",
-        "scenario_gen",
-        "drive",
-        str(bag),
-        "--planner",
-        "busy:Busy",
-        "--workers",
-        "2",
-        "--out",
-        "out",
-    ]
-    with subprocess.Popen(
-        words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as drive:
-        while drive.poll() is None and not list(tmp_path.glob("*.busy")):
-            time.sleep(0.01)
-        assert drive.poll() is None, "it ended before it could be killed"
-        drive.kill()
-    patience = time.monotonic() + 60.0  # else they would be at it for months
-    workers = [Path("/proc") / path.stem / "exe" for path in tmp_path.glob("*.busy")]
-    while any(os.path.lexists(worker) for worker in workers) and time.monotonic() < patience:
-        time.sleep(0.01)
-    assert workers and not any(os.path.lexists(worker) for worker in workers)
-
-
-def test_a_planner_that_ends_the_process_of_the_command_is_named():
+def test_planner_ending_command_process_is_named():
     code = (
         "import os\nfrom scenario_gen.closed_loop.timeouts import end_named\n"
         "with end_named(): pass\n"

@@ -59,7 +59,7 @@ def test_a_phone_shows_all_of_it(browser, file):
     tab.page.close()
 
 
-def test_the_page_of_a_search_without_a_failure_raises_no_error(browser, tmp_path):
+def test_search_page_without_failure_works(browser, tmp_path):
     words = {
         "planner": PLANNER,
         "title": "a on straight",

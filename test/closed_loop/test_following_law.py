@@ -28,20 +28,20 @@ def desired_gap(speed, leader):
 
 @pytest.mark.parametrize(("speed", "leader"), [(3.0, 3.0), (12.0, 12.0), (12.0, 10.0), (9.0, 9.5)])
 @pytest.mark.parametrize("ratio", [0.8, 1.0, 1.25, 2.0, 5.0])
-def test_acceleration_falls_with_the_square_of_the_gap(speed, leader, ratio):
+def test_acceleration_falls_with_squared_gap(speed, leader, ratio):
     gap = ratio * desired_gap(speed, leader)
     expected = A - A / ratio**2
     assert following_acceleration(DRIVER, 0, gap, speed, leader, 0.0) == pytest.approx(expected)
 
 
-def test_a_much_faster_leader_leaves_the_standstill_gap():
+def test_faster_leader_leaves_standstill_gap():
     assert desired_gap(5.0, 30.0) < S0
     assert following_acceleration(DRIVER, 0, S0, 5.0, 30.0, 0.0) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("leader", [0.0, 4.0])
 @pytest.mark.parametrize("braking", [1.0, 6.0])
-def test_braking_is_comfortable_or_a_quarter_more_than_stops_behind_the_leader(leader, braking):
+def test_braking_is_comfortable_or_just_stops(leader, braking):
     speed = 12.0
     assert following_acceleration(DRIVER, 0, 60.0, speed, leader, braking) == pytest.approx(
         max(-B, A - A * (desired_gap(speed, leader) / 60.0) ** 2)
@@ -54,11 +54,11 @@ def test_braking_is_comfortable_or_a_quarter_more_than_stops_behind_the_leader(l
 
 
 @pytest.mark.parametrize(("way", "speed", "wait"), [(10.0, 6.0, 2.0), (10.0, 6.0, 2.5)])
-def test_a_place_is_reached_when_its_wait_is_over(way, speed, wait):
+def test_place_is_reached_after_its_wait(way, speed, wait):
     acceleration = approach_acceleration(DRIVER, 0, way, speed, wait)
     assert speed * wait + 0.5 * acceleration * wait**2 == pytest.approx(way)
 
 
-def test_a_stop_before_a_long_wait_needs_the_whole_way():
+def test_stop_needs_the_whole_way():
     acceleration = approach_acceleration(DRIVER, 0, 10.0, 6.0, 60.0)
     assert acceleration == pytest.approx(-(6.0**2) / (2.0 * 10.0))

@@ -34,7 +34,7 @@ def road_of(drivable, res):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_the_depth_is_that_of_the_deepest_point_to_a_centimetre(seed):
+def test_depth_is_of_the_deepest_point(seed):
     rng = np.random.default_rng(seed)
     res = (1.0, 0.5)[seed]
     drivable = np.zeros((30, 30), dtype=np.bool_)
@@ -60,7 +60,7 @@ def straight_drive(start, end):
     return SimpleNamespace(motion=motion, ego=0, driven=21)
 
 
-def test_a_drive_beside_the_edge_and_over_it():
+def test_drive_beside_and_over_the_edge():
     drivable = np.zeros((40, 80), dtype=np.bool_)
     drivable[:20] = True  # up to y = 10 m
     road = road_of(drivable, 0.5)
@@ -75,7 +75,7 @@ def test_a_drive_beside_the_edge_and_over_it():
     assert far.margin == -MAX_DEPTH_M
 
 
-def test_a_post_under_the_car_is_as_deep_as_its_centre():
+def test_post_under_car_has_centre_depth():
     drivable = np.ones((60, 60), dtype=np.bool_)
     drivable[20:24, 20:24] = False  # 0.8 m wide
     assert _depth(road_of(drivable, 0.2), np.array([4.7, 4.3, 0.4]), HALF) == pytest.approx(

@@ -71,7 +71,7 @@ def bag(tmp_path_factory):
     return folder / "out" / "bag"
 
 
-def test_blind_planners_fail_and_planners_that_look_pass(bag):
+def test_blind_planners_fail_looking_ones_pass(bag):
     trials = read_trials(bag)
     assert len(trials) == 4
     blind = [NonReactive, FullThrottle, *(partial(Steady, v) for v in (3.0, 5.0, 8.0, 12.0))]
@@ -82,7 +82,7 @@ def test_blind_planners_fail_and_planners_that_look_pass(bag):
     assert all(judge(loop, loop.drive(ReferenceFollower(loop))).passed for loop in loops)
 
 
-def test_laws_that_pass_as_certified_are_those_that_pass_when_the_others_react(bag):
+def test_certified_laws_pass_with_reacting_others(bag):
     laws = [SpeedLaw(wait, speed) for wait in (0.0, 3.0, 8.0, 13.0, 18.0) for speed in (4.0, 8.0)]
     agreed = []
     for trial in read_trials(bag):
@@ -92,30 +92,16 @@ def test_laws_that_pass_as_certified_are_those_that_pass_when_the_others_react(b
     assert np.mean(agreed) > 0.9
 
 
-def test_who_stands_first_fails(bag):
-    """Laws that the family does not have."""
-    trials = read_trials(bag)
-    for speed, stand in ((7.0, 3.2), (5.0, 6.3), (9.0, 11.1), (20.0, 0.0)):
-        outcomes = run_trials(trials, partial(Steady, speed, stand))
-        assert sum(outcome.verdict.passed for outcome in outcomes) <= 1
-
-
 def test_such_a_set_is_valid(bag):
     sets = evaluate_bag(bag)
     assert sum(len(each.verdicts) for each in sets) == 4 == sum(each.valid for each in sets)
 
 
-def test_who_waits_for_nobody_is_refused_with_the_reason(tmp_path):
+def test_vehicle_waiting_for_nobody_is_refused(tmp_path):
     words = (str(bundled("b")), "--road", "t_intersection", "--ego", "1", "--count", "1")
     done = generated(tmp_path / "none", *words)
     output = " ".join(str(done.exception or done.output).split())
     assert done.exit_code != 0 and "for testing ego 1: vehicle 1 waits for nobody" in output
-
-
-def test_a_search_ends_with_its_budget(tmp_path):
-    words = ("examples/my_log.csv", "--road", "four_way", "--ego", "2", "--count", "500")
-    done = generated(tmp_path / "some", *words, "--budget", "2")
-    assert done.exit_code != 0 and "of 500 scenarios" in str(done.exception)
 
 
 def test_without_an_ego_it_is_refused(tmp_path):
@@ -125,7 +111,7 @@ def test_without_an_ego_it_is_refused(tmp_path):
     )
 
 
-def test_who_is_committed_does_not_rescue_an_ego_that_looks_at_nobody():
+def test_committed_vehicle_does_not_rescue_ego():
     """A driver with priority brakes for one that crosses out of turn when it looks ahead far enough, and not in time else."""
     witness, other = straight(0.0, -48.0, np.pi / 2, 4.0), straight(-96.0, 0.0, 0.0, 12.0)
     verdicts = {}
@@ -146,7 +132,7 @@ def test_who_is_committed_does_not_rescue_an_ego_that_looks_at_nobody():
     )  # it brakes, too late
 
 
-def test_the_best_blind_planner_is_in_all_results(tmp_path):
+def test_best_blind_planner_is_in_results(tmp_path):
     trials = [Trial(str(k), crossing(), 0, None) for k in range(3)]
     rate = blind_rate([ClosedLoop(trial.scenario, trial.ego) for trial in trials])
     outcomes = run_trials(trials, NonReactive)

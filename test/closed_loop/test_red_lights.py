@@ -17,7 +17,7 @@ from scenario_gen.situation import runs_red
 SIGNALS = {"road.priority": "signals"}
 
 
-def test_a_planner_is_convicted_if_it_ignores_the_light():
+def test_ignoring_the_light_is_convicted():
     (encounter,) = read_log(signalised()).encounters
     result = generate(encounter, "four_way", SIGNALS, count=3)
     for scenario in result:
@@ -39,7 +39,7 @@ class Dawdler(IdmFollower):
         return Command(min(command.acceleration, slowest), command.curvature)
 
 
-def test_others_that_the_ego_delays_wait_at_red(tmp_path):
+def test_delayed_others_wait_at_red(tmp_path):
     file = tmp_path / "map.xml"
     cycles = ["green:80 yellow:30 red:290", "red:130 green:60 yellow:10 red:200"]
     file.write_text(crossing_map(cycles, queue=2))

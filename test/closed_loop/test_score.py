@@ -14,13 +14,13 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.types.road import Road
 
 
-def test_a_drive_that_is_as_its_witness_has_the_full_score():
+def test_witness_like_drive_has_full_score():
     verdict, _ = verdict_of([straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)], go_on)
     assert verdict.terms.nuplan == verdict.terms.pdms == 1.0 and verdict.fault == ""
     assert verdict.document()["terms"]["pdms"] == 1.0
 
 
-def test_who_stands_has_no_progress_and_who_brakes_hard_no_comfort():
+def test_standing_and_hard_braking_lose_terms():
     motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
     verdict, _ = verdict_of(motions, lambda _: Command(-3.0, 0.0))
     assert (
@@ -32,7 +32,7 @@ def test_who_stands_has_no_progress_and_who_brakes_hard_no_comfort():
     assert verdict.terms.comfort == 0.0 and verdict.terms.making_progress == 1.0
 
 
-def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
+def test_front_hits_are_at_fault():
     """As nuPlan has it: not the one that stands, nor the one that is hit from behind."""
     stands, comes = straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)
     hit, _ = verdict_of([comes, stands], go_on)
@@ -45,7 +45,7 @@ def test_at_fault_is_the_one_who_hits_with_the_front_or_what_stands():
     assert hit.terms.no_at_fault_collision == 1.0 and hit.fault == "other_ran_into_ego"
 
 
-def test_a_jump_fails_whatever_the_goal_says():
+def test_jump_fails_despite_the_goal():
     verdict, _ = verdict_of(
         [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)],
         lambda _: Pose(149.0, 0.0, 0.0, 10.0),
@@ -58,7 +58,7 @@ def test_a_jump_fails_whatever_the_goal_says():
     )
 
 
-def test_a_jump_over_others_and_off_the_road_is_a_jump_and_nothing_else():
+def test_jump_is_no_collision_or_exit():
     """From one lane across another car to a place beyond the road's edge."""
     drivable = np.ones((100, 1000), dtype=np.bool_)
     road = Road(
@@ -79,7 +79,7 @@ def test_a_jump_over_others_and_off_the_road_is_a_jump_and_nothing_else():
 
 
 @pytest.mark.parametrize(("aside", "counted"), [(0.02, False), (0.3, True)])
-def test_off_the_road_counts_from_a_depth(aside, counted):
+def test_off_road_counts_from_a_depth(aside, counted):
     drivable = np.zeros((100, 1000), dtype=np.bool_)
     drivable[40:60] = True  # y from -2 to 2 m
     road = Road(
@@ -108,7 +108,7 @@ def test_off_the_road_counts_from_a_depth(aside, counted):
     assert "by more than 10 m" in replace(verdict, off_road=1.0, road_margin=-10.0).sentence()
 
 
-def test_an_obstacle_in_the_way_is_named():
+def test_obstacle_in_the_way_is_named():
     config = RoadConfig(arm_length=100.0)
     x, y = build_road("straight", config=config).lanes.lanes[0].centre[30].tolist()
     name = f"{x:g} {y + 1.85:g} 0 4 2"

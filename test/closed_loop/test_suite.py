@@ -51,7 +51,7 @@ def driven(bags, tmp_path_factory):
     return result.output, out
 
 
-def test_bags_are_found_in_folders_and_lists(bags):
+def test_bags_are_in_folders_and_lists(bags):
     one, two = bags / "one" / "bag", bags / "two" / "road=r" / "part-0"
     assert bags_in([bags]) == [one, two] == bags_in([bags / "list.txt"])
     assert bags_in([one, bags / "two", one]) == [one, two]
@@ -77,7 +77,7 @@ def test_planners_are_compared_in_all_bags(driven):
     assert second["planner"].endswith("Stands") and len(second["drives"]) == 4
 
 
-def test_one_planner_is_compared_with_its_earlier_version_in_all_bags(bags, driven, tmp_path):
+def test_planner_is_compared_with_earlier_version(bags, driven, tmp_path):
     words = ["drive", str(bags), "--workers", "1", "--count", "2", "--out", str(tmp_path / "o")]
     words += ["--no-baseline", "--against", str(driven[1] / "drives-1.json")]
     result = CliRunner().invoke(app, [*words, "--planner", f"{__name__}:Stands"])
@@ -109,7 +109,7 @@ def test_scenarios_weigh_as_in_the_traffic():
     assert category_of(trials[0]) == ("crossing", "car")
 
 
-def test_the_page_sorts_by_planner_and_links_to_scenarios(browser, driven):
+def test_suite_page_sorts_and_links(browser, driven):
     file = driven[1] / "suite.html"
     for size in (DESKTOP, PHONE):
         tab = Tab(browser, file, size)

@@ -39,7 +39,7 @@ def test_a_trailer_keeps_to_its_truck():
     assert distance.min() > 9.3 and distance.max() < 9.5 + 1e-6
 
 
-def test_a_vehicle_with_a_trailer_is_no_ego():
+def test_vehicle_with_trailer_is_no_ego():
     scenario = moving(ROWS, vehicles=[TRUCK, Vehicle("c")])
     with pytest.raises(InputError, match="has or is a trailer"):
         ClosedLoop(scenario, "t")

@@ -54,7 +54,7 @@ def go_on(_):
     return Command(0.0, 0.0)
 
 
-def test_who_runs_into_a_stand_is_the_one_that_moves():
+def test_moving_vehicle_runs_into_standing_one():
     """Lengths are 4.0 and 4.5 m: at 10 m/s the front reaches the tail after (40 - 4.25) / 10 s."""
     verdict, drive = verdict_of(
         [straight(0, 0, 0, 10.0), straight(40.0, 0, 0, 0.0)], lambda _: Command(0.0, 0.0)
@@ -82,7 +82,7 @@ def test_who_runs_into_a_stand_is_the_one_that_moves():
     assert verdict.collision.ran is Runner.BOTH and verdict.collision.speed == pytest.approx(20.0)
 
 
-def test_a_contact_between_two_instants_is_found():
+def test_contact_between_instants_is_found():
     """The ego passes through the other's corner in less than a step: at no instant do they overlap."""
     side = straight(0.0, 30.0, -np.pi / 2, 0.0)  # stands across the way, its end at y = 27.75
     verdict, drive = verdict_of(
@@ -96,7 +96,7 @@ def test_a_contact_between_two_instants_is_found():
     )
 
 
-def test_leaving_the_road_goal_progress_and_comfort():
+def test_off_road_goal_progress_and_comfort():
     drivable = np.zeros((100, 1000), dtype=np.bool_)
     drivable[40:60] = True  # y from -2 to 2 m
     road = Road(
@@ -137,7 +137,7 @@ def test_leaving_the_road_goal_progress_and_comfort():
     )
 
 
-def test_time_to_collision_and_post_encroachment_time():
+def test_time_to_collision_and_post_encroachment():
     """Closing at 5 m/s from a gap of 20 - 4.25 m; crossing 2 s after the other has left."""
     verdict, _ = verdict_of(
         [straight(0, 0, 0, 10.0), straight(20.0, 0, 0, 5.0)],
@@ -163,7 +163,7 @@ def trials():
     ]
 
 
-def test_many_drives_give_the_same_bytes_with_two_workers(trials):
+def test_two_workers_give_same_bytes(trials):
     name, config = "scenario_gen.closed_loop.planners:IdmFollower", ClosedLoopConfig()
     one, two = (run_trials(trials, name, config, workers) for workers in (1, 2))
     first, second = (Drives(outcomes, name, config, trials) for outcomes in (one, two))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 import json
-import os
 import re
 import signal
 import subprocess
@@ -22,19 +21,14 @@ from support.source_files import ROOT
 
 from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import scenario_bytes
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.cli.commands import main
 from scenario_gen.corpus.batch import run_batch
-from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find
-from scenario_gen.corpus.parts import BatchRequest, LOST_CONFLICT
+from scenario_gen.corpus.parts import BatchRequest
 from scenario_gen.corpus.tables import rows_of
-from scenario_gen.corpus.tasks import Workers
-from scenario_gen.method.chain import Generation
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import criticality
-from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.sampling import SamplingConfig
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -73,7 +67,7 @@ def test_every_case_is_accounted_for(batch):
     assert len({case["seed"] for case in cases}) == 6
 
 
-def test_scenarios_are_found_by_what_they_are_and_copied(batch, tmp_path, monkeypatch, capsys):
+def test_scenarios_are_found_and_copied(batch, tmp_path, monkeypatch, capsys):
     out, made = batch
     condition = "road = 'corridor' and speed > 1 and index % 2 = 0"
     found = find(out, condition)
@@ -134,24 +128,7 @@ def test_scenarios_are_found_by_what_they_are_and_copied(batch, tmp_path, monkey
     assert limited.rows == find(out).rows[:2] and limited.count == made.scenarios
 
 
-def test_recorded_encounters_are_found_by_their_figures(corpus, tmp_path):
-    encounters = {row["name"]: encounter_of(row) for row in rows_of(tables_of(corpus[0]))}
-    found = find(corpus[0], "pet < 3 and gap < 6")
-    assert 0 < len(found.rows) < len(encounters) and "crossing on recorded" in "".join(
-        coverage_lines(found, corpus[0])
-    )
-    for row in found.rows:
-        measures = criticality(encounters[row["template"]], 10.0)
-        assert row["pet"] == pytest.approx(measures.pet, abs=1e-6) and row["ttc"] == pytest.approx(
-            measures.min_ttc, abs=1e-6
-        )
-    with pytest.raises(
-        InputError, match="holds recordings; to get a bag, generate scenarios with"
-    ):
-        export_hits(corpus[0], found.rows[:1], tmp_path / "none")
-
-
-def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
+def test_batch_resumes_only_as_itself(batch, corpus):
     out, _ = batch
     before = digests(out)
     (
@@ -165,7 +142,7 @@ def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
             run_batch(corpus[0], ROADS, out, replace(REQUEST, **other), templates=TEMPLATES)
 
 
-def test_a_batch_grows_by_what_it_lacks(corpus, tmp_path):
+def test_batch_grows_by_what_it_lacks(corpus, tmp_path):
     """By templates, roads and scenarios; what is there is neither written again nor changed."""
     out = tmp_path / "out"
 
@@ -224,51 +201,13 @@ def at_work(run, folder, pattern):
         time.sleep(0.01)
 
 
-@pytest.mark.long
-def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus, tmp_path):
-    """The run is killed with its workers as soon as its first file is there, and then done by Dask to the end."""
-    out = tmp_path / "again"
-    words = [
-        sys.executable,
-        "-m",
-        "scenario_gen",
-        "batch",
-        str(corpus[0]),
-        "--out",
-        str(out),
-        "--count",
-        "3",
-        "--seed",
-        "5",
-    ]
-    words += ["--templates", str(TEMPLATES), "--roads", ",".join(ROADS), "--workers", "2"]
-    with subprocess.Popen(
-        words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as run:
-        at_work(run, out, "part-*.parquet")
-        os.killpg(run.pid, signal.SIGKILL)
-    made = run_batch(corpus[0], ROADS, out, REQUEST, templates=TEMPLATES, workers=Workers(2))
-    assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
-
-
-@pytest.mark.parametrize(
-    ("inside", "said"),
-    [("", "is within the input"), ("batch", "is within the input"), ("archive.json", "is a file")],
-)
-def test_a_batch_is_written_beside_its_corpus(corpus, inside, said):
-    before = sorted(corpus[0].rglob("*"))
-    with pytest.raises(InputError, match=said):
-        run_batch(corpus[0], ["straight"], corpus[0] / inside)
-    assert sorted(corpus[0].rglob("*")) == before
-
-
 FOREVER = "(SELECT count(*) FROM range(100000000) a, range(100000000) b WHERE a.range * b.range % 7 = 3) > pet"
 
 
 @pytest.mark.parametrize(
     "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.long)]
 )
-def test_a_find_that_is_ended_leaves_nothing(batch, number):
+def test_ended_find_leaves_nothing(batch, number):
     """Ctrl-C leaves nothing; after SIGKILL any other command on the batch takes away what was left."""
     out = batch[0]
     words = [sys.executable, "-m", "scenario_gen", "find", str(out)]
@@ -282,71 +221,7 @@ def test_a_find_that_is_ended_leaves_nothing(batch, number):
     assert not list(out.glob(".scenario_gen*"))
 
 
-def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
-    with pytest.raises(InputError, match="nowhere"):
-        run_batch(
-            corpus[0],
-            ["straight", "nowhere"],
-            tmp_path / "out",
-            BatchRequest(count=1),
-            templates=1,
-        )
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("kind", "why", "failures"),
-    [
-        (
-            LostEncounterError,
-            "has no place that keeps the encounter: vehicles 1 and 2 do not meet",
-            {LOST_CONFLICT: 4},
-        ),
-        (
-            RefusedError,
-            "has 4 arms, and the recorded vehicles enter and leave by 3 (one each: vehicles 1, 2)",
-            {
-                f"road {name} has … arms, and the recorded vehicles enter and leave by …": 2
-                for name in ROADS
-            },
-        ),
-    ],
-)
-def test_like_refusals_are_counted_under_one_cause(
-    corpus, tmp_path, monkeypatch, kind, why, failures
-):
-    def refuse(generation, _):
-        raise kind(f"road {generation.road} {why}")
-
-    monkeypatch.setattr(Generation, "plan", refuse)
-    made = run_batch(
-        corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1)
-    )
-    assert made.failures == failures and not made.failed
-    cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
-    assert {case["why"].split()[1] for case in cases} == set(ROADS)
-
-
-def test_a_recording_that_is_too_long_for_a_road_is_shortened(corpus, tmp_path, monkeypatch):
-    row = next(rows_of(tables_of(corpus[0])))
-    limit = 0.95 * encounter_of(row).duration
-
-    plan = Generation.plan
-
-    def short_road(generation, encounter):
-        if encounter.duration > limit:
-            raise RefusedError("the road is too short")
-        return plan(generation, encounter)
-
-    monkeypatch.setattr(Generation, "plan", short_road)
-    out, workers = tmp_path / "out", Workers(1)
-    made = run_batch(corpus[0], ["corridor"], out, REQUEST, templates=1, workers=workers)
-    (case,) = rows_of(sorted((out / "cases").rglob("*.parquet")))
-    assert made.shortened == 1 and case["published"] == REQUEST.count
-    assert "shortened" in " ".join(made.lines()) and " of " in case["shortened"]
-
-
-def test_drawn_decisions_have_a_set_for_each_outcome(corpus, tmp_path):
+def test_drawn_decisions_have_one_set_each(corpus, tmp_path):
     drawn = BatchRequest(PipelineConfig(sampling=SamplingConfig(decisions="drawn")), 8, 5)
     made = run_batch(corpus[0], ["corridor"], tmp_path / "out", drawn, templates=3)
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))

@@ -89,7 +89,7 @@ def test_a_fault_costs_its_rows(mined, fault):
     assert result.read == (len(FAULTS) - len(UNREAD), len(FAULTS))
 
 
-def test_a_changed_a_new_and_a_removed_file_cost_their_own_ranges(archive, tmp_path):
+def test_changed_files_cost_their_own_ranges(archive, tmp_path):
     rows = sorted(archive.glob("*.csv"))[0].read_bytes().splitlines(keepends=True)[:16_000]
     parts = [b"".join(rows[k::5]) for k in range(5)]
     folder, out = tmp_path / "in", tmp_path / "out"

@@ -18,7 +18,7 @@ from scenario_gen.corpus.mine import mine
 SPMD = ",".join(["1"] * 19) + "\n"
 
 
-def test_each_file_of_an_archive_is_one_thing(tmp_path):
+def test_each_archive_file_is_one_thing(tmp_path):
     for name, text in {
         "a/one.csv": SPMD,
         "a/deep/two.txt": SPMD,
@@ -49,7 +49,7 @@ def test_each_file_of_an_archive_is_one_thing(tmp_path):
     ]
 
 
-def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, monkeypatch):
+def test_log_without_encounter_is_a_result(tmp_path, monkeypatch):
     logs = tmp_path / "logs"
     logs.mkdir()
     (logs / "sub").mkdir()
@@ -74,7 +74,7 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
     assert mine([logs], tmp_path / "corpus").encounters == 1
 
 
-def test_an_odd_entry_is_named_and_costs_only_itself(tmp_path):
+def test_odd_entry_costs_only_itself(tmp_path):
     logs = tmp_path / "logs"
     (logs / "sub").mkdir(parents=True)
     (logs / "sub" / "good.csv").write_text((ROOT / "examples" / "my_log.csv").read_text())

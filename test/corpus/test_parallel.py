@@ -17,7 +17,7 @@ from scenario_gen import (
 )
 
 
-def test_workers_do_not_change_results_and_a_refusal_keeps_its_place():
+def test_workers_do_not_change_results():
     (encounter,) = read_log(str(ROOT / "examples" / "my_log.csv")).encounters
     cases = [(encounter, "straight"), (encounter, "four_way")]
     alone, spread = (generate_many(cases, count=1, seed=3, workers=workers) for workers in (1, 2))

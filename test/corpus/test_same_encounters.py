@@ -13,7 +13,6 @@ import pytest
 from support.archives import ArchiveConfig, read_planted, write_archive
 
 from scenario_gen.corpus.encounters import encounter_of, tables_of
-from scenario_gen.corpus.find import find
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.tables import rows_of
@@ -131,25 +130,3 @@ def test_rows_in_any_form(tmp_path, form):
     assert read == mined and len(mined)
     table = next(rows_of(tables_of(tmp_path / "out")))
     assert abs(table["start_ns"] * 1e-9 - 259_203_600 - SPMD_EPOCH_NS * 1e-9) < 1.0
-
-
-@pytest.mark.parametrize("form", ["header", "parquet"])
-def test_names_of_folders_are_neither_values_nor_patterns(tmp_path, form):
-    """`Speed=50/` is no column of the tables in it, and `[ab].csv` does not mean `a.csv`."""
-    lines = (column(tmp_path / "spmd", 4, 1.2, 20.0) / "a.csv").read_text().splitlines()
-    plain = written(lines, tmp_path / "plain", form)
-    mine([plain], tmp_path / "out")
-    found = [row["tracks"] for row in rows_of(tables_of(tmp_path / "out"))]
-    assert found
-    names = ("Speed=50", "TxDevice=7", "device=7", "lat=1", "filename=1")
-    odd = tmp_path.joinpath(*names)
-    odd.mkdir(parents=True)
-    corpus = odd / "[ab]=out*?"
-    folder = written(lines, odd / "[ab]", form)
-    (file,) = folder.iterdir()
-    file.rename(folder / f"[ab]?*{file.suffix}")
-    decoy = written(lines[:200], odd / "a", form)
-    next(decoy.iterdir()).rename(decoy / f"ab{file.suffix}")
-    mine([folder], corpus)
-    assert [row["tracks"] for row in rows_of(tables_of(corpus))] == found
-    assert len(find(corpus, "road = 'recorded'").rows) == len(found)

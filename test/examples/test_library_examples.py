@@ -14,7 +14,7 @@ import pytest
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def test_the_script_generates_from_the_bundled_log_without_ros():
+def test_script_generates_without_ros():
     script = f"runpy.run_path({str(EXAMPLES / 'generate.py')!r}, run_name='__main__')"
     command = f"import runpy, sys; sys.modules['rclpy'] = None; sys.argv = ['generate.py', '--count', '4']; {script}"
     ran = subprocess.run(
@@ -54,7 +54,7 @@ def test_the_notebook_was_executed_and_runs(name, pictures, capsys):
     )
 
 
-def test_the_notebook_of_drive_env_was_executed_and_its_first_cells_run(monkeypatch):
+def test_drive_env_notebook_was_executed(monkeypatch):
     """Learning takes a minute, so it is not repeated; one drive with the policy is."""
     cells = [
         cell

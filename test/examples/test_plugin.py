@@ -95,35 +95,6 @@ def test_the_command_takes_all_by_name(python):
     assert lines[0] == "time,vehicle,x,y,heading,speed" and len(lines) > 100
 
 
-USE = """
-from pathlib import Path
-from scenario_gen import build_road, evaluate_scenarios, fit_template, plan_routes, PlanningConfig, read_log, segment
-from scenario_gen.method.evaluation import replay
-
-(encounter,) = read_log("log.jsonl").encounters  # its format is found by its name
-road = build_road("skew_crossing", encounter)
-fit = fit_template(encounter, segment(encounter), road)
-config = PlanningConfig(planner="one_corner")
-routes = plan_routes(road, fit, config, seed=1)
-assert [len(route.points) > 1 for route in routes] == [not fitted.stands.all() for fitted in fit.fitted]
-evaluation = evaluate_scenarios(encounter, {"replay": [replay(encounter, fit)]})
-assert abs(evaluation.value("replay", "mean_speed") / evaluation.value("recording", "mean_speed") - 1.0) < 0.1
-assert "| **Speed** |" in evaluation.to_markdown()
-"""
-
-
-def test_mining_finds_logs_of_the_format(python):
-    (python.folder / "archive").mkdir()
-    shutil.copy(python.folder / "log.jsonl", python.folder / "archive")
-
-    assert "1 encounter" in python("-m", "scenario_gen", "mine", "archive", "--out", "corpus")
-
-
-@pytest.mark.long
-def test_the_library_takes_all_by_name(python):
-    python("-c", USE)
-
-
 TYPES = """
 import pandas as pd
 from scenario_gen import read_log
@@ -134,14 +105,6 @@ table["type"] = table["vehicle"].map(dict(zip(table["vehicle"].unique(), ("Cargo
 table["speed"], table["x"], table["y"] = 0.5 * table["speed"], 0.5 * table["x"], 0.5 * table["y"]
 bike = read_log(table).encounters[0].vehicles[0]
 print(bike.type, bike.length, bike.kind.dynamics.max_speed)
-"""
-
-
-def test_a_type_of_the_package_is_read(python):
-    assert python("-c", TYPES).strip() == "cargo_bike 2.6 7.0"
-
-
-LIMITS = """
 from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.method.config import PipelineConfig
 
@@ -154,5 +117,7 @@ print(flatten(config)["limits.cargo_bike.max_speed"][1])
 """
 
 
-def test_limits_of_its_type_can_be_set(python):
-    assert python("-c", LIMITS).split() == ["6.0", "0.5", "7.0", "6.0"]
+def test_plugin_type_has_settable_limits(python):
+    read, *limits = python("-c", TYPES).splitlines()
+    assert read == "cargo_bike 2.6 7.0"
+    assert " ".join(limits).split() == ["6.0", "0.5", "7.0", "6.0"]

@@ -1,22 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Ways to damage an input: bytes of any format, cells of a table in text, columns of Parquet, values of SQLite."""
+"""Ways to damage an input: bytes of any format, cells of a table in text, elements of XML."""
 
 from collections.abc import Callable, Sequence
-import contextlib
 import copy
-import io
 import math
 import random
 import re
-import sqlite3
 import struct
-import tempfile
 from xml.etree import ElementTree
-
-import pyarrow as pa
-from pyarrow import parquet as pq
 
 TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True false 9223372036854775807 9223372036854775808
     -9223372036854775809 18446744073709551616 1e400 0x10 1_000 1,5 12:30:05 2024-02-30 9999-12-31 0001-01-01T00:00:00Z
@@ -35,17 +28,6 @@ WORDS = (
     *(struct.pack("<d", value) for value in (math.nan, math.inf, 1e308, -0.0, 5e-324)),
     *(struct.pack("<q", value) for value in (-(2**63), 2**63 - 1, 2**31, 2**32 - 1)),
 )
-REALS = (None, 0.0, -1.0, 1e308, -0.0, 5e-324, math.nan, math.inf, -math.inf, 2.0**53)
-WHOLE = (None, 0, 1, -1, 127, 2**31, 2**53, 2**62, 2**63 - 1, -(2**63))
-PLAIN = "int8 int64 uint64 float32 float64 bool null string large_string binary date32 date64"
-TYPES = (
-    *map(pa.type_for_alias, PLAIN.split()),
-    *(pa.dictionary(pa.int32(), pa.string()), pa.decimal128(38, 6), pa.time64("ns")),
-    *(pa.timestamp(unit) for unit in ("s", "us", "ns")),
-    *(pa.timestamp("us", zone) for zone in ("UTC", "Europe/Berlin", "+05:30")),
-    *(pa.duration("us"), pa.list_(pa.int64()), pa.struct([("a", pa.int64())])),
-)
-PANDAS = (b"{}", b"[]", b"null", b"{", b'{"columns": 3, "index_columns": []}')
 
 
 def flip(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -99,23 +81,6 @@ def integer(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 BYTES = (flip, cut, splice, token, integer)
 
 
-def lines_of(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Shuffle, repeat, reverse, drop or exchange the lines of a text."""
-    lines = data.split(b"\n")
-    head, rows = lines[:1], lines[1:]
-    rng.shuffle(extra := [*rows])
-    more = [*rows, rng.choice(lines)]
-    turned = (rows[::-1], rows[:: rng.choice((2, 3, 10, 50))])
-    ways = (
-        head + extra,
-        head + rows * rng.choice((2, 5)),
-        *(head + each for each in turned),
-        rows,
-        more,
-    )
-    return b"\n".join(rng.choice(ways))
-
-
 def cells(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     """Write words into cells: one, some or all of a column, or the header; scale or shift numbers."""
     table = [line.split(b",") for line in data.split(b"\n")]
@@ -145,113 +110,7 @@ def scaled(cell: bytes, factor: float, shift: float) -> bytes:
         return cell
 
 
-TEXT = (*BYTES, lines_of, cells, cells, cells)
-
-
-def columns(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Write a Parquet table anew with a column of another type, other values, another name, or none; with other metadata."""
-    try:
-        table = changed(rng, pq.read_table(io.BytesIO(data), use_threads=False))
-        out = io.BytesIO()
-        packing = rng.choice(("none", "snappy", "gzip", "zstd"))
-        pq.write_table(table, out, compression=packing, use_dictionary=rng.random() < 0.5)
-    except Exception:  # it is damaged already, or there is no such conversion
-        return rng.choice(BYTES)(rng, data, seeds)
-    return out.getvalue()
-
-
-def changed(rng: random.Random, table: pa.Table) -> pa.Table:
-    """Return an Arrow table with one thing wrong."""
-    at, other = rng.randrange(table.num_columns), rng.randrange(table.num_columns)
-    name, values = table.column_names[at], table.column(at)
-    match rng.randrange(8):
-        case 0:
-            values = values.cast(rng.choice(TYPES), safe=False)
-        case 1:
-            few = rng.choice((WHOLE, REALS, NUMBERS))
-            values = pa.array([rng.choice(few) for _ in values])
-        case 2:
-            holed = [None if rng.random() < 0.1 else value.as_py() for value in values]
-            values = pa.array(holed, type=values.type)
-        case 3:
-            factor = rng.choice((0.0, -1.0, 1e-9, 1e3, 1e6, 1e9, 1e300))
-            numbers = values.cast(pa.float64(), safe=False).to_numpy() * factor
-            values = pa.array(numbers).cast(values.type, safe=False)
-        case 4:
-            name = rng.choice(
-                (*table.column_names, *["t_s", "time", "utc", "lat", "id", "speed"], "", "\x00")
-            )
-        case 5:
-            return table.remove_column(at)
-        case 6:
-            return table.replace_schema_metadata({b"pandas": rng.choice(PANDAS)})
-        case _:
-            return table.append_column(name, table.column(other))
-    return table.set_column(at, name, values)
-
-
-def records(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Change an SQLite file through SQL: values of any type in any column, columns and tables renamed, added or dropped."""
-    try:
-        with tempfile.NamedTemporaryFile(suffix=".db3") as file:
-            file.write(data)
-            file.flush()
-            with contextlib.closing(sqlite3.connect(file.name)) as base:
-                base.text_factory = bytes
-                base.execute("pragma journal_mode = off")
-                statement, values = sentence(rng, base)
-                base.execute(statement, values)
-                base.commit()
-            file.seek(0)
-            return file.read()
-    except (sqlite3.Error, UnicodeError, IndexError, OverflowError, ValueError):
-        return rng.choice(BYTES)(rng, data, seeds)
-
-
-def sentence(rng: random.Random, base: sqlite3.Connection) -> tuple[str, tuple[object, ...]]:
-    """Return an SQL statement that damages one table, with its values."""
-    tables = base.execute("select name from sqlite_master where type = 'table'").fetchall()
-    table = rng.choice(tables)[0].decode()
-    column = rng.choice(base.execute(f'pragma table_info("{table}")').fetchall())[1].decode()
-    texts = ("text", "", b"", b"\xff\x00", b"\x00\x01\x00\x00", "é" * 2000, "{", "[]")
-    value = rng.choice((*WHOLE, *REALS, *texts, rng.randbytes(40)))
-    name = rng.choice(("id", "data", "x", "timestamp", "name", "type", "topic_id"))
-    some = f"rowid * {rng.randrange(1, 97)} % 97 < {rng.choice((1, 10, 97))}"
-    update = f'update "{table}" set "{column}" = ? where {some}'
-    statements = (
-        f'alter table "{table}" rename column "{column}" to "{name}"',
-        f'alter table "{table}" drop column "{column}"',
-        f'alter table "{table}" rename to "{name}"',
-        f'drop table "{table}"',
-        f'delete from "{table}" where {some}',
-        f'insert into "{table}" select * from "{table}" limit 3',
-    )
-    statement = rng.choice((update, update, *statements))
-    return statement, (value,) * statement.count("?")
-
-
-def header(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Drop, repeat, exchange or rename whole columns of a table in text."""
-    table = [line.split(b",") for line in data.split(b"\n")]
-    width = len(table[0])
-    one, other = rng.randrange(width), rng.randrange(width)
-    how = rng.randrange(5)
-    if how == 4:
-        table[0][one] = rng.choice(
-            (*table[0], b"", b"x", b" " + table[0][one], table[0][one].upper())
-        )
-    for row in table if how < 4 else ():
-        if len(row) != width:
-            continue
-        if how == 0:
-            del row[one]
-        elif how == 1:
-            row.insert(other, row[one])
-        elif how == 2:
-            row[one], row[other] = row[other], row[one]
-        else:
-            row[one] = row[other]
-    return b"\n".join(b",".join(row) for row in table)
+TEXT = (*BYTES, *[cells] * 3)
 
 
 def tree(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:

@@ -4,18 +4,15 @@
 """The readers of bags, maps, parameters and JSON as targets."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 import io
 import json
 from pathlib import Path
 import random
-import re
-import tempfile
 
 from fuzzing.broken import small
 from fuzzing.harness import Target
-from fuzzing.mutators import BYTES, records, TEXT, TEXTS, WORDS
+from fuzzing.mutators import BYTES, TEXT
 from fuzzing.targets_logs import bags
 import numpy as np
 from PIL import Image
@@ -30,21 +27,16 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import ScenarioGenError
-from scenario_gen.base.parameters import assigned, flatten, loaded
+from scenario_gen.base.parameters import loaded
 from scenario_gen.closed_loop.comparison import read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.search.journal import open_journal, read_journal
-from scenario_gen.closed_loop.search.response import Response
-from scenario_gen.logs import read_log
-from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation import EvaluationConfig
-from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import evaluate_bag
-from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
-PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image
+PARTED = b"\n# ---- image ----\n"  # a map as one input: its TEXT, this, and its image
 
 
 def runs(folder: Path) -> list[bytes]:
@@ -58,17 +50,6 @@ def runs(folder: Path) -> list[bytes]:
                 bag.write(message.topic, message.data, message.stamp_ns)
         found.append((folder / f"bag{k}" / f"bag{k}_0.mcap").read_bytes())
     return found
-
-
-def generated(folder: Path) -> list[bytes]:
-    """A bag that a scenario can be made from again."""
-    (encounter,) = read_log([bundled("b")]).encounters
-    case = generate(encounter, "t_intersection", CONFIG, count=2, seed=7)
-    bag = write_recording(
-        folder / "bag",
-        replace(case, provenance=provenance_of([bundled("b")], 7, 2, ["t_intersection"], CONFIG)),
-    )
-    return [(bag / "bag_0.mcap").read_bytes()]
 
 
 def ros1(folder: Path) -> list[bytes]:
@@ -85,38 +66,6 @@ def ros1(folder: Path) -> list[bytes]:
                 writer.write(text, k, b"\x01\x00\x00\x00a")
                 writer.write(head, k, bytes(16))
     return [path.read_bytes() for path in sorted(folder.glob("*.bag"))]
-
-
-def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Write a bag anew with messages damaged, at other stamps or under other topics."""
-    try:
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            (folder / "in.mcap").write_bytes(data)
-            found = list(read_messages(folder / "in.mcap"))
-            chosen = {rng.randrange(len(found)) for _ in range(rng.choice((1, 1, 2, 5)))}
-            with BagWriter(folder / "out", compress=False) as bag:
-                for k, message in enumerate(found):
-                    if k in chosen:
-                        other = rng.choice(found)
-                        content = rng.choice(BYTES)(rng, message.data, [other.data])
-                        stamp = rng.choice((0, 1, 2**62, message.stamp_ns + 1))
-                        changes = (
-                            {"topic": other.topic},
-                            {"stamp_ns": stamp},
-                            {"data": other.data},
-                            {"type": other.type},
-                            *[{"data": content}] * 4,
-                        )
-                        message = message._replace(**rng.choice(changes))  # noqa: PLW2901
-                    bag.add_topic(message.topic, message.type)
-                    bag.write(message.topic, message.data, message.stamp_ns)
-            return (folder / "out" / "out_0.mcap").read_bytes()
-    except (ScenarioGenError, ValueError, IndexError):
-        return rng.choice(BYTES)(rng, data, seeds)
-
-
-BAG = (*BYTES, *[messages] * 3)
 
 
 def in_file(name: str, read: Callable[[Path], object]) -> Callable[[bytes, Path], None]:
@@ -204,39 +153,6 @@ def parameter_files(_folder: Path) -> list[bytes]:
     return [whole.read_bytes(), few]
 
 
-def assignments(_folder: Path) -> list[bytes]:
-    """One assignment for each parameter, and values of all kinds."""
-    odd = [
-        "'",
-        '"',
-        "[1,2]",
-        "{a:[}",
-        "!!int",
-        "!!bool",
-        "*a",
-        "&a[*a]",
-        "%YAML",
-        "...",
-        "2024-99-99",
-    ]
-    values = (*TEXTS.split(), "", *odd)
-    names = list(flatten(PipelineConfig()))
-    kept = [f"{name}={value}" for name, (_, value) in flatten(PipelineConfig()).items()]
-    odd = [f"{names[k * 7 % len(names)]}={value}" for k, value in enumerate(values)]
-    return [text.encode("utf-8", "surrogatepass") for text in (*kept, *odd)]
-
-
-def assign_one(data: bytes, _folder: Path) -> None:
-    """Set one parameter."""
-    assigned(PipelineConfig(), data.decode("utf-8", "surrogateescape"))
-
-
-@cache
-def encounters() -> tuple:
-    """Two short encounters of the bundled log."""
-    return tuple(read_log([bundled(case)]).encounters[0] for case in "bc")
-
-
 def drives(folder: Path) -> list[bytes]:
     """A drives.json of two drives."""
     found = [{"name": str(k), "scenario": "0f" * 8, "passed": k == 1} for k in range(2)]
@@ -251,21 +167,7 @@ def refuse_other_drives(path: Path) -> None:
     )
 
 
-def journals(folder: Path) -> list[bytes]:
-    """The journal of a search of three drives."""
-    with open_journal(folder / "a.journal.jsonl", {"planner": "p:C", "seed": 7}) as journal:
-        for response in (
-            Response(1.5, (1.5, 2.0)),
-            Response(-3.1, (0.2, 1.0), "the ego and 2 meet: rear end", ("collision", "at_fault")),
-        ):
-            journal.add(response)
-    return [(folder / "a.journal.jsonl").read_bytes()]
-
-
 EXTREMES = '[0, -1, 1, 9007199254740992, 9223372036854775808, 1e308, -1e308, 1e-320, 0.5, null, true, "", "x", [], {}, [[]]]'
-DEEP = re.findall(
-    rb"[^|]+", b'[|{a: |- |? |{"a":|&a |*a|!!float |!!binary |!!set |<<: |%TAG ! x\n'
-)
 
 
 def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -291,14 +193,7 @@ def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
         return rng.choice(BYTES)(rng, data, seeds)
 
 
-def deep(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Put brackets, anchors or tags somewhere, few or very many."""
-    at, word = rng.randrange(len(data) + 1), rng.choice((*DEEP, *WORDS))
-    return data[:at] + word * rng.choice((1, 2, 40, 3000)) + data[at:]
-
-
-JSON = (*BYTES, deep, *[values] * 6)
-YAML = (*TEXT, deep, deep)
+JSON = (*BYTES, *[values] * 6)
 SQLITE = partial(bags, StoragePlugin.SQLITE3)
 TARGETS = (
     Target(
@@ -313,29 +208,27 @@ TARGETS = (
         "sqlite_reader",
         SQLITE,
         in_file("a.db3", read_bag),
-        (*BYTES, *[records] * 5),
+        BYTES,
         ("sqlite/*",),
         "a.db3",
     ),
     Target("ros1_reader", ros1, in_file("a.bag", read_bag), BYTES, named="a.bag"),
-    Target("evaluate", runs, in_file("a.mcap", measure), BAG, ("validate/*", "mcap_reader/*")),
+    Target("evaluate", runs, in_file("a.mcap", measure), BYTES, ("validate/*", "mcap_reader/*")),
     Target(
         "metadata",
         metadata,
         in_file("metadata.yaml", read_folder),
-        YAML,
+        TEXT,
         ("meta/*",),
         "metadata.yaml",
     ),
-    Target("map", maps, read_map, (*BYTES, deep), ("map/*.yaml", "*.yaml")),
+    Target("map", maps, read_map, BYTES, ("map/*.yaml", "*.yaml")),
     Target(
         "parameters",
         parameter_files,
         in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)),
-        YAML,
+        TEXT,
         ("params/*",),
     ),
-    Target("assignment", assignments, assign_one, (*BYTES, deep)),
     Target("drives_json", drives, in_file("drives.json", refuse_other_drives), JSON),
-    Target("journal", journals, in_file("a.journal.jsonl", read_journal), (*BYTES, *TEXT)),
 )

@@ -9,9 +9,9 @@ import random
 import re
 
 from fuzzing.harness import Mutator, Target
-from fuzzing.mutators import BYTES, header, TEXT, tree
+from fuzzing.mutators import BYTES, TEXT, tree
 from fuzzing.targets_bags import JSON
-from fuzzing.targets_logs import PARQUET, safety_messages, SHORT
+from fuzzing.targets_logs import safety_messages, SHORT
 from fuzzing.targets_maps import MAP
 import pandas as pd
 from support.recording_files import (
@@ -42,8 +42,8 @@ from scenario_gen.logs.synthetic import bundled
 
 FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
 WAYS: dict[str, Sequence[Mutator]] = {
-    ".csv": (*TEXT, *[header] * 6),
-    ".parquet": PARQUET,
+    ".csv": TEXT,
+    ".parquet": BYTES,
     ".mcap": BYTES,
     ".xml": MAP,
     ".xosc": (*MAP, *[tree] * 6),

@@ -6,14 +6,13 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
-import gzip
 import json
 from pathlib import Path
 import struct
 import tempfile
 
 from fuzzing.harness import Target
-from fuzzing.mutators import BYTES, columns, records, TEXT, tree
+from fuzzing.mutators import BYTES, TEXT, tree
 import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -112,11 +111,6 @@ def simulated(_folder: Path) -> list[bytes]:
         for row in cars().itertuples()
     ]
     return [f"<fcd-export>{''.join(rows)}</fcd-export>".encode()]
-
-
-def packed(_folder: Path) -> list[bytes]:
-    """A table in a .gz."""
-    return [gzip.compress(cars().to_csv(index=False).encode())]
 
 
 def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
@@ -247,36 +241,28 @@ def heard(_folder: Path) -> list[bytes]:
     return [bytes(found)]
 
 
-NAMELESS = replace(SHORT, columns="speed=none,vehicle=none")
-SPMD = replace(SHORT, format="spmd")
-PARQUET, SQLITE = (*BYTES, *[columns] * 5), (*BYTES, *[records] * 5)
 MCAP_BAGS, SQLITE_BAGS = partial(bags, StoragePlugin.MCAP), partial(bags, StoragePlugin.SQLITE3)
 TARGETS = (
     Target("table", texts, read_as("log.csv"), TEXT, ("table/*.csv", "table_*.csv"), "log.csv"),
-    Target("table_asked", texts, read_as("log.txt", NAMELESS), TEXT, ("table/*.csv",), "log.txt"),
     Target(
         "spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv"), "log.csv"
-    ),
-    Target(
-        "spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",), "log.csv"
     ),
     Target("bsm", pilots, read_as("log.json", replace(SHORT, format="bsm")), TEXT),
     Target(
         "fcd", simulated, read_as("log.xml", replace(SHORT, format="fcd")), (*TEXT, *[tree] * 3)
     ),
-    Target("packed", packed, read_as("log.csv.gz"), BYTES),
     Target(
         "parquet",
         parquets,
         read_as("log.parquet"),
-        PARQUET,
+        BYTES,
         ("parquet/*", "*.parquet"),
         "log.parquet",
     ),
     Target(
         "mcap_log", MCAP_BAGS, read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap"), "log.mcap"
     ),
-    Target("sqlite_log", SQLITE_BAGS, read_as("log.db3"), SQLITE, ("sqlite/*",), "log.db3"),
+    Target("sqlite_log", SQLITE_BAGS, read_as("log.db3"), BYTES, ("sqlite/*",), "log.db3"),
     Target("payloads", payloads, decode, BYTES, named="log"),
     Target("streams", heard, put, BYTES),
 )

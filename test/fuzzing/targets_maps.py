@@ -12,15 +12,12 @@ import re
 
 from fuzzing.harness import Target
 from fuzzing.mutators import BYTES, NUMBERS, TEXT, tree
-from fuzzing.targets_bags import in_file, values
+from fuzzing.targets_bags import in_file
 import numpy as np
 from support.map_builders import FORMATS
 from support.message_examples import road_with
 
-from msg_conventions.cdr import decode, encode
-from msg_conventions.layouts import STRING
 from msg_conventions.roads import decode_description, encode_description
-from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road
@@ -55,16 +52,6 @@ def attributes(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes
     return data
 
 
-def texts(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Change the number between two tags."""
-    found = list(re.finditer(rb">([-\d.e]+)<", data))
-    if not found:
-        return attributes(rng, data, seeds)
-    one = rng.choice(found)
-    number = rng.choice(NUMBERS).encode("utf-8", "surrogatepass")
-    return data[: one.start(1)] + number + data[one.end(1) :]
-
-
 @cache
 def template() -> object:
     """An encounter that is laid on what was read: six seconds of two cars, for which there is place."""
@@ -85,16 +72,7 @@ def lanes() -> list[bytes]:
     return [encode_description(each, b"", 5) for each in (road, replace(road, lanes=None))]
 
 
-def said(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Change what a message says of its lanes, and keep its form."""
-    try:
-        text = decode(STRING, data, "").data
-        return encode(STRING, data=values(rng, text.encode(), seeds).decode())
-    except (InputError, UnicodeError):  # it was damaged before
-        return rng.choice(BYTES)(rng, data, seeds)
-
-
-MAP = (*TEXT, *[attributes] * 8, *[texts] * 4, *[tree] * 6)
+MAP = (*TEXT, *[attributes] * 8, *[tree] * 6)
 TARGETS = (
     *(
         Target(
@@ -106,6 +84,6 @@ TARGETS = (
         "message_lanes",
         lambda _: lanes(),
         lambda data, _: decode_description(data),
-        (*BYTES, *[said] * 6),
+        BYTES,
     ),
 )

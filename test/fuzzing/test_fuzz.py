@@ -16,7 +16,7 @@ DAMAGED = 400 if LONG else 4
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
+def test_only_own_errors_come_out(name, tmp_path):
     seeds = corpus(TARGETS[name], found=False)
     executions = len(seeds) + DAMAGED
     record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0, seeds=seeds)
@@ -26,14 +26,14 @@ def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
     )
 
 
-def test_every_format_of_logs_has_a_target():
+def test_every_log_format_has_a_target():
     named = {"bag": "mcap_log", "commonroad": "commonroad_log"}
     assert {named.get(name, name) for name in LOG_FORMATS.built_in} <= set(TARGETS)
 
 
 @pytest.mark.recorded
 @pytest.mark.parametrize("name", [name for name, target in TARGETS.items() if target.crashes])
-def test_what_once_broke_a_reader_does_so_no_more(name, tmp_path):
+def test_earlier_crashes_stay_fixed(name, tmp_path):
     seeds = found_crashes(TARGETS[name])
     if not seeds:
         pytest.skip(f"{NO_RECORDS}: {CRASHES}")

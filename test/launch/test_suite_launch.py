@@ -56,7 +56,7 @@ def generate_test_description():
 class TestTheSuite(unittest.TestCase):
     """While it runs."""
 
-    def test_it_generates_what_it_is_asked_for(self):
+    def test_requested_scenarios_are_generated(self):
         from support.suite_processes import Client
 
         client = Client(int(os.environ.get("ROS_DOMAIN_ID", "0")))

@@ -82,7 +82,7 @@ def test_a_repeated_column_is_named(tmp_path, column):
         read_log(path)
 
 
-def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
+def test_unknown_types_are_counted_or_omitted(tmp_path):
     folder, _ = interaction(tmp_path)
     tracks_file = folder / "vehicle_tracks_000.csv"
     tracks_file.write_text(
@@ -103,7 +103,7 @@ def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
         read_log(folder, LogConfig(types="cars"))
 
 
-def test_a_type_that_contradicts_its_motion_is_said(tmp_path):
+def test_type_contradicting_its_motion_is_reported(tmp_path):
     folder, _ = interaction(tmp_path)
     tracks_file = folder / "vehicle_tracks_000.csv"
     tracks_file.write_text(tracks_file.read_text().replace("car", "pedestrian"))
@@ -128,7 +128,7 @@ def test_two_recordings_are_refused(tmp_path):
         read_log(tmp_path)
 
 
-def test_a_broken_scenario_is_named_with_its_line(tmp_path):
+def test_broken_scenario_has_its_line(tmp_path):
     path, _ = commonroad(tmp_path)
     text = path.read_text()
     for old, new, said in (
@@ -142,7 +142,7 @@ def test_a_broken_scenario_is_named_with_its_line(tmp_path):
             read_log(path)
 
 
-def test_headings_of_a_scene_above_a_turn_are_degrees(tmp_path):
+def test_large_scene_headings_are_degrees(tmp_path):
     in_degrees = read_log(nocturne(tmp_path)[0])
     in_radians = read_log(nocturne(tmp_path, float)[0])
     assert any("headings in degrees" in note for note in in_degrees.quality.notes)
@@ -169,7 +169,7 @@ def test_headings_of_a_scene_above_a_turn_are_degrees(tmp_path):
     ],
     ids=["key", "length", "numbers", "vehicles"],
 )
-def test_a_broken_scene_is_named_with_its_object(tmp_path, change, said):
+def test_broken_scene_has_its_object(tmp_path, change, said):
     path, _ = nocturne(tmp_path)
     scene = json.loads(path.read_text())
     change(scene)

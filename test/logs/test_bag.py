@@ -24,7 +24,6 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 import scenario_gen.logs.bag
 from scenario_gen.logs.quality import DoubtError
-from scenario_gen.types import Encounter, Vehicle
 
 STORES = type_store()
 TRACKS = "trajectory_msgs/msg/MultiDOFJointTrajectory"
@@ -127,7 +126,7 @@ def test_fixes_and_speeds(tmp_path, plain, plugin):
 
 
 @pytest.mark.parametrize("compression", [None, *Ros1Writer.CompressionFormat], ids=str)
-def test_a_bag_of_ros_1_is_read_like_one_of_ros_2(tmp_path, compression):
+def test_ros_1_bag_equals_ros_2(tmp_path, compression):
     """Its headers have a number, its types other names, and one topic is of a type that nobody knows."""
     types = get_typestore(Stores.ROS1_NOETIC)
     types.register(
@@ -171,7 +170,7 @@ def test_a_bag_of_ros_1_is_read_like_one_of_ros_2(tmp_path, compression):
 
 
 @pytest.mark.parametrize("damage", ["cut", "not closed", "other fields", "bomb"])
-def test_a_bag_of_ros_1_that_cannot_be_read_is_named(tmp_path, damage):
+def test_unreadable_ros_1_bag_is_named(tmp_path, damage):
     types = get_typestore(Stores.ROS1_NOETIC)
     if damage == "other fields":
         types = get_typestore(Stores.EMPTY)
@@ -193,7 +192,7 @@ def test_a_bag_of_ros_1_that_cannot_be_read_is_named(tmp_path, damage):
         read_log(path)
 
 
-def test_a_channel_without_schema_or_of_another_kind_breaks_nothing(tmp_path):
+def test_channels_without_schema_break_nothing(tmp_path):
     with (tmp_path / "a.mcap").open("wb") as stream:
         writer = McapWriter(stream)
         writer.start(profile="ros2")
@@ -221,7 +220,7 @@ def test_a_channel_without_schema_or_of_another_kind_breaks_nothing(tmp_path):
         list(read_messages(tmp_path / "a.mcap", lambda name: name == "/bare"))
 
 
-def test_without_header_stamps_the_reception_counts_and_is_said(tmp_path, plain):
+def test_missing_stamps_mean_time_of_reception(tmp_path, plain):
     result = read_log(write(tmp_path / "bag", streams(crossing(), stamped=False)))
     assert any("no header stamps" in line for line in result.quality.lines())
     assert abs(result.encounters[0].start_ns - plain.start_ns) <= 100_000_000
@@ -254,7 +253,7 @@ def test_odometry(tmp_path):
 
 
 @pytest.mark.parametrize("topic", ["/{}/odometry/filtered", "/fleet/vehicle_{}/local/ekf/odom"])
-def test_the_level_in_which_topics_differ_names_the_vehicle(tmp_path, topic):
+def test_differing_topic_level_names_the_vehicle(tmp_path, topic):
     bag = write(tmp_path / "drive", odometry(crossing(), topic))
     assert [vehicle.id for vehicle in read_log(bag).encounters[0].vehicles] == ["a", "b"]
 
@@ -394,14 +393,14 @@ def test_ways_of_recording_two_vehicles(tmp_path, way):
     np.testing.assert_allclose(encounter.position, plain.position, atol=0.3)
 
 
-def test_one_topic_in_each_bag_is_named_by_its_bag(tmp_path):
+def test_topic_in_each_bag_names_vehicles(tmp_path):
     rows = crossing()
     bags = [write(tmp_path / f"bag_{name}", odometry(of(rows, name), "/odom")) for name in "ab"]
     (encounter,) = read_log(bags).encounters
     assert [vehicle.id for vehicle in encounter.vehicles] == ["bag_a", "bag_b"]
 
 
-def test_a_folder_of_bags_and_tables_is_read_whole(tmp_path):
+def test_folder_of_bags_and_tables_works(tmp_path):
     bag = write(tmp_path / "bag", odometry(crossing()))
     folder = tmp_path / "drives"
     folder.mkdir()
@@ -413,7 +412,7 @@ def test_a_folder_of_bags_and_tables_is_read_whole(tmp_path):
         np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
 
 
-def test_header_clocks_that_differ_stop_and_those_of_the_recorder_agree(tmp_path):
+def test_differing_header_clocks_are_a_doubt(tmp_path):
     (plain,) = read_log(save(crossing(), tmp_path)).encounters
     rows = crossing()
     ahead = of(rows, "a").assign(t_s=lambda own: own.t_s + 2.0)
@@ -429,7 +428,7 @@ def test_header_clocks_that_differ_stop_and_those_of_the_recorder_agree(tmp_path
     ("ahead_s", "rate", "said"),
     [(0.4, 1.0, "clocks differ by 0.4 s"), (0.0, 1.03, "runs 1.03 times as fast")],
 )
-def test_a_small_difference_of_clocks_is_said(tmp_path, ahead_s, rate, said):
+def test_small_difference_of_clocks_is_reported(tmp_path, ahead_s, rate, said):
     rows = crossing()
     other = of(rows, "b")
     late = pd.Series((other.t_s - 1000.0) * (1.0 / rate - 1.0) - ahead_s)
@@ -440,7 +439,7 @@ def test_a_small_difference_of_clocks_is_said(tmp_path, ahead_s, rate, said):
     assert said in " ".join(map(str, read_log(bag).doubts))
 
 
-def test_clocks_of_tracked_objects_and_the_ego_are_compared(tmp_path):
+def test_clocks_of_objects_and_ego_compared(tmp_path):
     path, _ = tracked(tmp_path)
     (bag,) = path.glob("*.mcap")
     lines = [
@@ -454,7 +453,7 @@ def test_clocks_of_tracked_objects_and_the_ego_are_compared(tmp_path):
     assert "ego" in read_log(both, stamps="received").encounters[0].ids
 
 
-def test_the_window_of_a_large_bag_is_that_of_the_whole_one(tmp_path, monkeypatch):
+def test_window_of_large_bag_is_unchanged(tmp_path, monkeypatch):
     bag = write(tmp_path / "drive", streams(crossing(40.0)))
     config = LogConfig(start=12.0, end=20.0)
     whole = read_log(bag, config)
@@ -476,14 +475,14 @@ def test_stamps_in_milliseconds_stop(tmp_path):
     assert read_log(bag, stamps="received").encounters[0].speed.max() < 8.5
 
 
-def test_two_odometries_of_one_robot_are_one_vehicle(tmp_path):
+def test_two_odometries_are_one_vehicle(tmp_path):
     rows = of(crossing(), "a")
     lines = [*odometry(rows, "/odom"), *odometry(rows, "/odometry/filtered")]
     with pytest.raises(InputError, match="both are read as one vehicle"):
         read_log(write(tmp_path / "bag", lines))
 
 
-def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
+def test_recorded_tracks_are_read_bit_exactly(tmp_path, plain):
     data = encode_tracks(plain)
     lines = [
         Line("/case/tracks", TRACKS, 5, data),
@@ -515,39 +514,6 @@ def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
     ):
         with pytest.raises(InputError, match=words):
             read_log(tmp_path / "bag", config)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (
-            {"position": np.full((2, 50, 2), 1e300)},
-            r"topic /tracks, message 1: a position is 1e\+300; at most 1e\+08",
-        ),
-        (
-            {"speed": np.full((2, 50), 1e308)},
-            r"topic /tracks, message 1: a speed is 1e\+308; at most 10000",
-        ),
-        (
-            {"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))},
-            r"joint name .*0.01 to 1000 m each",
-        ),
-        ({"period": 1e-9}, "topic /tracks, message 1: 49 steps of 1e-09 s"),
-    ],
-)
-def test_tracks_of_no_road_are_refused(tmp_path, change, said):
-    plain = {
-        "position": np.zeros((2, 50, 2)),
-        "speed": np.ones((2, 50)),
-        "vehicles": (Vehicle("a"), Vehicle("b")),
-        "period": 0.1,
-    }
-    encounter = Encounter.sampled(
-        name="e", start_ns=10**18, heading=np.zeros((2, 50)), **(plain | change)
-    )
-    bag = write(tmp_path / "bag", [Line("/tracks", TRACKS, 10**18, encode_tracks(encounter))])
-    with pytest.raises(InputError, match=said):
-        read_log(bag)
 
 
 def test_several_tracks_are_several_encounters(tmp_path, plain):
@@ -594,20 +560,8 @@ def test_a_damaged_message_is_named(tmp_path):
         read_log(write(tmp_path / "bag", lines))
 
 
-def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):
-    bags = sorted(path for path in data.glob("bags/*/*") if path.is_dir())
-    assert len(bags) == 8
-    for bag in bags:
-        for path in (
-            bag,
-            next(file for file in sorted(bag.iterdir()) if file.suffix in (".mcap", ".db3")),
-        ):
-            with pytest.raises(InputError, match=r"no topic to read, it has .*msgs"):
-                read_log(path)
-
-
 @pytest.mark.parametrize("frame", ["gps" + "x" * k for k in range(9)])
-def test_a_fix_is_read_whatever_the_length_of_its_frame(frame):
+def test_fix_is_read_with_any_frame(frame):
     store = type_store()
     types = store.types
     fix = types[FIX](

@@ -87,7 +87,7 @@ def test_jumps(tmp_path):
     assert_close_to(result, good, tmp_path)
 
 
-def test_a_lasting_jump_is_a_new_place(tmp_path):
+def test_lasting_jump_is_a_new_place(tmp_path):
     rows = crossing(seconds=24.0)
     rows.loc[(rows["vehicle_id"] == "a") & (rows["t_s"] > 1012.0), "y_m"] -= 45.0
     result = read_log(save(rows, tmp_path))
@@ -111,7 +111,7 @@ def test_gaps_are_bridged_or_cut(tmp_path):
     assert [round(encounter.duration, 1) for encounter in bridged.encounters] == [24.0]
 
 
-def test_a_slow_source_is_not_cut_to_bits(tmp_path):
+def test_slow_source_is_not_cut_up(tmp_path):
     result = read_log(save(crossing(seconds=20.0, rate=1.0), tmp_path), LogConfig(proximity=500.0))
     (encounter,) = result.encounters
     assert encounter.duration == pytest.approx(20.0)
@@ -237,7 +237,7 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
     ],
     ids=["never near", "too short", "hardly driven"],
 )
-def test_why_two_are_no_encounter_is_said_with_what_would_take_them(tmp_path, config, words):
+def test_missing_encounter_has_reason_and_remedy(tmp_path, config, words):
     path = save(crossing(), tmp_path)
     with pytest.raises(NoEncounterError, match=words) as error:
         read_log(path, config)

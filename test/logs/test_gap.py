@@ -33,7 +33,7 @@ def by_all_pairs(a, b):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_follower_has_twice_its_time_gap_at_any_speed(seed):
+def test_follower_has_twice_its_time_gap(seed):
     random = np.random.default_rng(seed)
     for _ in range(100):
         speed, behind, turned = (
@@ -50,7 +50,7 @@ def test_a_follower_has_twice_its_time_gap_at_any_speed(seed):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_the_gap_is_the_least_of_all_pairs_of_moments(seed):
+def test_gap_is_least_of_all_moments(seed):
     random = np.random.default_rng(seed)
     for _ in range(25):
         a, b = drive(random), drive(random)
@@ -59,7 +59,7 @@ def test_the_gap_is_the_least_of_all_pairs_of_moments(seed):
         assert gap == pytest.approx(space_time_gap(b, a, DT)[0], abs=0.1)
 
 
-def test_two_that_pass_each_other_beside_are_apart_by_that():
+def test_passing_vehicles_have_their_lateral_gap():
     a, b = (
         np.column_stack([20.0 * (TIME - 6.0), 0.0 * TIME]),
         np.column_stack([-20.0 * (TIME - 6.0), 3.5 + 0.0 * TIME]),

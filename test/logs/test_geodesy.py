@@ -67,7 +67,7 @@ def assert_right(encounter, metres, within=0.25):
     "origin",
     [(-16.8, 179.9999), (-16.8, -180.0), (64.0, 180.0), (42.3, -83.7), (0.0, 0.001), (51.5, 0.0)],
 )
-def test_a_junction_is_right_wherever_it_lies(tmp_path, origin):
+def test_junction_is_right_wherever_it_lies(tmp_path, origin):
     rows, metres = crossing(origin)
     (encounter,) = read_log(save(rows, tmp_path)).encounters
     assert_right(encounter, metres)
@@ -94,14 +94,14 @@ def test_sites_far_apart_are_each_right(tmp_path):
         assert away.max() < 100.0 and np.hypot(*encounter.position.reshape(-1, 2).T).max() < 4000.0
 
 
-def test_an_origin_that_is_given_counts_for_all(tmp_path):
+def test_given_origin_counts_for_all(tmp_path):
     rows, metres = crossing((42.3, -83.7))
     near = read_log(save(rows, tmp_path), LogConfig(origin="42.31,-83.7"))
     assert near.encounters[0].origin == (42.31, -83.7)
     assert_right(near.encounters[0], metres)
 
 
-def test_an_id_at_two_sites_is_one_vehicle_at_each(tmp_path):
+def test_id_at_two_sites_is_two(tmp_path):
     (here, metres), (there, _) = crossing((42.3, -83.7)), crossing((48.1, 11.6), begin=30.0)
     found = read_log(save(pd.concat([here, there]), tmp_path)).encounters
     assert [[vehicle.id for vehicle in one.vehicles] for one in found] == [["v00", "v01"]] * 2
@@ -109,7 +109,7 @@ def test_an_id_at_two_sites_is_one_vehicle_at_each(tmp_path):
         assert_right(encounter, metres)
 
 
-def test_a_chain_of_places_is_one_site():
+def test_chain_of_places_is_one_site():
     along = np.column_stack([np.full(100, 50.0), np.linspace(-181.0, -170.0, 100)])
     assert set(sites_of(along)) == {0}
     assert len(set(sites_of(np.vstack([along, along + 1.0])))) == 2

@@ -38,14 +38,14 @@ def groups(tmp_path, *cars, **options):
     ], result.quality
 
 
-def test_a_vehicle_that_is_there_for_most_of_it_shortens_the_encounter(tmp_path):
+def test_mostly_present_vehicle_shortens_the_encounter(tmp_path):
     cars = (car("1", 0, 10, 0, 0, 8), car("2", 0, 10, 0, 4, 8), car("3", 0, 7, 20, 0, 8))
     found, quality = groups(tmp_path, *cars, whole=True)
     assert found == [("1,2,3", 7.0)]
     assert quality.notes == ("vehicle 3 shortens its encounter to 7.0 of 10.0 s",)
 
 
-def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
+def test_briefly_present_vehicle_is_left_out(tmp_path):
     cars = (car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
     found, quality = groups(tmp_path, *cars, whole=True)
     assert found == [("1,2", 20.0)]
@@ -60,7 +60,7 @@ def presence(tmp_path, *cars, **options):
     ], result
 
 
-def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
+def test_vehicles_may_arrive_late_leave_early(tmp_path):
     cars = (
         car("1", 0, 20, 0, 0, 8),
         car("2", 0, 20, 0, 4, 8),
@@ -75,7 +75,7 @@ def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
     assert any("vehicle 4 from 5.0 to 9.0 s" in line for line in result.quality.lines())
 
 
-def test_who_comes_nearer_than_100_m_arrives_then(tmp_path):
+def test_vehicles_arrive_when_within_100_m(tmp_path):
     (found,), _ = presence(
         tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 20, 250, 8, -8)
     )
@@ -83,7 +83,7 @@ def test_who_comes_nearer_than_100_m_arrives_then(tmp_path):
     assert found["3"] == pytest.approx((94, 200), abs=2)  # 250 m at 16 m/s
 
 
-def test_a_moment_at_the_edge_shortens_the_encounter(tmp_path):
+def test_moment_at_edge_shortens_the_encounter(tmp_path):
     (found,), result = presence(
         tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0.8, 20, 20, 0, 8)
     )
@@ -121,7 +121,7 @@ def test_nobody_is_left_out_in_silence(tmp_path):
     )
 )
 @settings(max_examples=10)
-def test_everybody_is_in_an_encounter_or_named(tmp_path_factory, cars):
+def test_everybody_is_in_encounters_or_named(tmp_path_factory, cars):
     tracks = [
         car(f"v{k}", begin, begin + lasts, x - 8 * begin, 3.5 * k, 8)
         for k, (begin, lasts, x) in enumerate(cars)
@@ -144,7 +144,7 @@ def test_proximity_bounds_the_encounter(tmp_path):
     assert seconds == pytest.approx(10.0, abs=0.25)  # nearer than 100 m from 10 s to 20 s
 
 
-def test_a_chain_of_neighbours_is_one_encounter(tmp_path):
+def test_chain_of_neighbours_is_one_encounter(tmp_path):
     found, _ = groups(tmp_path, *(car(str(k), 0, 10, 60 * k, 0, 10) for k in range(4)))
     assert found == [("0,1,2,3", 10.0)]  # the ends are 180 m apart
 
@@ -175,7 +175,7 @@ def test_long_meetings_are_cut(tmp_path):
     assert sum(seconds for _, seconds in found) > 95.0
 
 
-def test_in_a_busy_log_only_those_who_interact_meet(tmp_path):
+def test_only_interacting_vehicles_meet_in_crowds(tmp_path):
     """Six cars: two pairs pass each other, a queue stands by; four at most in one encounter."""
     cars = [
         car("1", 0, 10, -40, 0, 8),
@@ -206,12 +206,12 @@ def test_a_reversal_cuts_the_track(tmp_path):
     assert [name for name, _ in found] == ["1,2", "1,2"]
 
 
-def test_a_column_of_13_is_encounters_of_three(tmp_path):
+def test_column_of_13_is_several_encounters(tmp_path):
     found, _ = groups(tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13)))
     assert [names for names, _ in found] == [f"{k},{k + 1},{k + 2}" for k in range(1, 13, 2)]
 
 
-def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
+def test_left_turn_with_far_oncoming_car(tmp_path):
     """The turner waits until the other one is 100 m away, and for longer."""
     time = np.round(np.arange(0.0, 60.05, 0.1), 3)
     driven = np.interp(time, [0, 5, 12, 18, 60], [0, 50, 50, 74, 494])  # waits from 5 to 12 s
@@ -236,7 +236,7 @@ def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
     assert Situation.of(encounter).kind(0, 1) == EncounterKind.LEFT_TURN
 
 
-def test_only_vehicles_that_come_near_another_one_are_smoothed(tmp_path, monkeypatch):
+def test_only_vehicles_that_meet_are_smoothed(tmp_path, monkeypatch):
     near = car("1", 0, 10, 0, 0, 8), car("2", 0, 10, 0, 4, 8)
     found, quality = groups(tmp_path, *near, car("3", 0, 10, 0, 5000, 8))
     assert found == [("1,2", 10.0)]

@@ -62,7 +62,7 @@ def test_contradictions_name_file_and_light(tmp_path, cycles, words):
     assert read_log(file, {"signals": "ignored"}).encounters[0].lights == ()
 
 
-def test_table_with_two_states_at_once_or_no_stop_line(tmp_path):
+def test_signal_tables_with_contradictions_are_refused(tmp_path):
     table = signalised(queue=2)
     table.loc[(table.vehicle == "3") & (table.time < 9.0), "signal"] = "green"
     with pytest.raises(InputError, match=r"traffic light B is (red|green) and"):

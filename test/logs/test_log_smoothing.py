@@ -25,7 +25,7 @@ from scenario_gen.logs.smoothing import (
 CONFIG = LogConfig()
 
 
-def test_the_motion_is_the_minimum_of_its_quadratic_program():
+def test_motion_minimises_its_quadratic_program():
     """Against scipy's general-purpose solver on a small case with active limits."""
     rng = np.random.Generator(np.random.PCG64(3))
     config = LogConfig(jerk=5.0, acceleration_limit=1.0, braking_limit=2.0)
@@ -68,7 +68,7 @@ def test_between_samples_the_acceleration_is_constant():
 
 @given(seed=st.integers(0, 10_000), radius=st.floats(8.0, 200.0), noise=st.floats(0.0, 0.4))
 @settings(max_examples=25)
-def test_a_path_through_noisy_points_of_an_arc(seed, radius, noise):
+def test_path_through_noisy_points_on_arc(seed, radius, noise):
     rng = np.random.Generator(np.random.PCG64(seed))
     along = np.linspace(0.0, min(60.0, 4.0 * radius), 120)
     angle = along / radius
@@ -112,7 +112,7 @@ def smoothed(track):
     return smooth_piece(track, interpolated_piece(track, 0, CONFIG), 0, CONFIG)
 
 
-def test_standing_is_still_and_keeps_its_heading():
+def test_standing_is_still_and_keeps_heading():
     speed = np.interp(np.arange(0.0, 20.0, 0.1), [0, 5, 8, 13, 18], [8.0, 8.0, 0.0, 0.0, 6.0])
     place, track = drive(speed, noise=0.3)
     smooth = smoothed(track)
@@ -124,7 +124,7 @@ def test_standing_is_still_and_keeps_its_heading():
     assert np.abs(smooth.position[:, 0] - place).max() < 0.4
 
 
-def test_a_sensor_that_is_off_by_three_percent_does_not_lengthen_the_way():
+def test_biased_sensor_does_not_lengthen_way():
     speed = np.full(400, 12.0)
     place, track = drive(speed, noise=0.2, sensor=1.03)
     smooth = smoothed(track)
@@ -132,7 +132,7 @@ def test_a_sensor_that_is_off_by_three_percent_does_not_lengthen_the_way():
     assert smooth.speed.mean() == pytest.approx(12.0, abs=0.1)
 
 
-def test_a_stuck_speed_sensor_does_not_stop_the_car():
+def test_stuck_speed_sensor_stops_no_car():
     speed = np.full(100, 10.0)
     place, track = drive(speed, noise=0.1, sensor=0.0)
     assert not standing(
@@ -142,7 +142,7 @@ def test_a_stuck_speed_sensor_does_not_stop_the_car():
     assert np.abs(smooth.position[:, 0] - place).max() < 1.5
 
 
-def test_coloured_noise_counts_for_more_than_white():
+def test_coloured_noise_counts_more_than_white():
     rng = np.random.Generator(np.random.PCG64(5))
     white = rng.normal(0.0, 1.0, 20_000)
     assert white_equivalent(white) == pytest.approx(1.0, rel=0.03)
@@ -150,7 +150,7 @@ def test_coloured_noise_counts_for_more_than_white():
     assert white_equivalent(coloured) == pytest.approx(np.sqrt(5.0), rel=0.08)
 
 
-def test_noise_of_the_fixes_is_no_lateral_acceleration():
+def test_noise_of_fixes_does_not_accelerate():
     """A straight drive at 15 m/s with 0.3 m of noise: before, the path followed it with several m/s²."""
     speed = np.full(150, 15.0)
     _, track = drive(speed, noise=0.3, seed=2)
@@ -175,7 +175,7 @@ def turning(noise, heading_noise):
     )
 
 
-def test_recorded_headings_are_used_where_a_car_is_slow():
+def test_slow_cars_have_their_recorded_headings():
     _, course, track = turning(1.0, np.radians(1.0))
     with_them = smoothed(track)
     without = smoothed(replace(track, heading=np.full(120, np.nan)))
@@ -189,7 +189,7 @@ def test_recorded_headings_are_used_where_a_car_is_slow():
 
 
 @pytest.mark.parametrize("wrong", [0.0, 2.5])
-def test_headings_that_are_none_have_no_say(wrong):
+def test_missing_headings_are_not_used(wrong):
     """A default, or one that is always far off; and one that jumps about while the car stands."""
     _, course, track = turning(0.1, 0.0)
     heading = np.full(120, wrong) if wrong else np.where(np.arange(120) < 10, -1.5, course)
@@ -197,7 +197,7 @@ def test_headings_that_are_none_have_no_say(wrong):
     assert np.degrees(np.abs(smooth.heading - course)).max() < 8.0
 
 
-def test_a_heading_is_weighed_by_its_scatter():
+def test_headings_are_weighed_by_their_scatter():
     rng = np.random.Generator(np.random.PCG64(9))
     course, speed = np.zeros(200), np.full(200, 5.0)
     steady = headings_of(course, course, speed)
@@ -206,7 +206,7 @@ def test_a_heading_is_weighed_by_its_scatter():
     assert headings_of(np.full(200, np.nan), course, speed) is None
 
 
-def test_who_reverses_in_a_short_stop_is_cut_there():
+def test_reversing_in_a_stop_is_cut():
     along = np.concatenate((0.2 * np.arange(100), np.full(5, 19.8), 19.8 - 0.2 * np.arange(100)))
     speed = np.abs(np.gradient(along, 0.1))
     _, track = drive(speed, noise=0.0)

@@ -127,7 +127,7 @@ READ = {  # name: rows as they are written, what a note says
 
 
 @pytest.mark.parametrize(("rows", "said"), READ.values(), ids=READ)
-def test_it_is_read_as_it_was_driven(tmp_path, rows, said):
+def test_table_is_read_as_driven(tmp_path, rows, said):
     rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
     result = read_log(tmp_path / "log.csv")
     (encounter,) = result.encounters
@@ -190,7 +190,7 @@ DOUBTED = {  # name: rows as they are written, the option that reads them right
 
 
 @pytest.mark.parametrize(("rows", "option"), DOUBTED.values(), ids=DOUBTED)
-def test_a_doubt_stops_with_the_option_that_reads_it_right(tmp_path, rows, option):
+def test_doubt_names_the_option_that_helps(tmp_path, rows, option):
     path = tmp_path / "log.csv"
     rows.rename(columns=NAMES).to_csv(path, index=False)
     with pytest.raises(InputError, match=re.escape(option)):
@@ -276,7 +276,7 @@ def test_a_contradiction_stops(tmp_path, rows, said):
         read_log(tmp_path / "log.csv")
 
 
-def test_a_stretch_of_wrong_speeds_is_a_doubt_that_does_not_stop(tmp_path):
+def test_wrong_speeds_are_a_doubt_only(tmp_path):
     with_zero_speeds(ROWS)[["t", "id", "x", "y", "v"]].to_csv(tmp_path / "log.csv", index=False)
     doubts = read_log(tmp_path / "log.csv").doubts
     assert {doubt.vehicle for doubt in doubts} == {"A", "B"}
@@ -287,7 +287,7 @@ def test_a_stretch_of_wrong_speeds_is_a_doubt_that_does_not_stop(tmp_path):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("factor", "stops"), [(1.19, []), (1.21, [True]), (2.01, [True])])
-def test_speeds_contradict_positions_from_a_fifth_on(tmp_path, factor, stops, sign):
+def test_speeds_contradict_positions_from_a_fifth(tmp_path, factor, stops, sign):
     rows = ROWS.assign(v=ROWS.v * factor**sign).drop(columns="h").rename(columns=NAMES)
     rows.to_csv(tmp_path / "log.csv", index=False)
     config = LogConfig(allow="doubt", columns="speed=speed:mps")
@@ -303,9 +303,7 @@ EGO_HEADINGS = {
 
 @pytest.mark.parametrize("heading", EGO_HEADINGS.values(), ids=EGO_HEADINGS)
 @pytest.mark.parametrize("has_ego", [True, False])
-def test_poses_of_an_ego_are_applied_where_positions_are_relative_to_it(
-    tmp_path, heading, has_ego
-):
+def test_relative_positions_have_ego_poses_applied(tmp_path, heading, has_ego):
     """The ego is a vehicle also if no row is its own."""
     ego = ROWS[ROWS.id == "A"].rename(columns={"x": "ego_x", "y": "ego_y", "h": "ego_yaw"})
     rows = ROWS.merge(ego[["t", "ego_x", "ego_y", "ego_yaw"]], on="t")
@@ -325,7 +323,7 @@ def test_poses_of_an_ego_are_applied_where_positions_are_relative_to_it(
 
 
 @pytest.mark.parametrize("order", ["by time", "by vehicle", "column"])
-def test_every_restart_of_the_clock_is_a_scene(tmp_path, order):
+def test_each_clock_restart_begins_a_scene(tmp_path, order):
     scenes = []
     for k in range(4):
         scene = ROWS.assign(t=ROWS.t - START_S, x=ROWS.x + 0.3 * k).drop(columns="h")
@@ -344,7 +342,7 @@ def test_every_restart_of_the_clock_is_a_scene(tmp_path, order):
 
 
 @pytest.mark.parametrize("names", [("car_a.csv", "car_b.csv"), ("car_a/gps.csv", "car_b/gps.csv")])
-def test_one_id_in_two_files_at_one_time_is_named_by_its_file(tmp_path, names):
+def test_shared_id_is_named_by_file(tmp_path, names):
     paths = [tmp_path / name for name in names]
     for path, name in zip(paths, "AB", strict=True):
         path.parent.mkdir(exist_ok=True)
@@ -353,7 +351,7 @@ def test_one_id_in_two_files_at_one_time_is_named_by_its_file(tmp_path, names):
     assert distance(encounter, ("car_a", "car_b")) < 0.5
 
 
-def test_sizes_and_types_belong_to_a_track(tmp_path):
+def test_sizes_and_types_belong_to_tracks(tmp_path):
     car = ROWS.assign(length=4.4, width=1.8, type="car")
     lorry = car.assign(t=car.t + 90.0)
     lorry.loc[lorry.id == "A", ["length", "width", "type"]] = [16.5, 2.5, "truck"]
@@ -370,7 +368,7 @@ def test_stamps_of_whole_seconds_stop(tmp_path):
         read_log(tmp_path / "log.csv")
 
 
-def test_rows_that_share_id_and_stamp_name_the_column_that_tells_them_apart(tmp_path):
+def test_shared_stamps_name_the_scene_column(tmp_path):
     moved = pd.concat([ROWS.assign(lap=k, x=ROWS.x + 40.0 * k) for k in (1, 2)])
     path = tmp_path / "log.csv"
     moved.sort_values("t", kind="stable").rename(columns=NAMES).to_csv(path, index=False)
@@ -394,7 +392,7 @@ def test_trajectories_of_one_vehicle_a_file(tmp_path):
     assert distance(encounter) < 0.5
 
 
-def test_an_unexpected_exception_is_called_a_bug_and_names_the_file(tmp_path, monkeypatch):
+def test_unexpected_exception_is_called_a_bug(tmp_path, monkeypatch):
     path = tmp_path / "log.csv"
     ROWS.rename(columns=NAMES).to_csv(path, index=False)
     monkeypatch.setattr("scenario_gen.logs.read.clean", lambda *_: 1 / 0)
@@ -402,7 +400,7 @@ def test_an_unexpected_exception_is_called_a_bug_and_names_the_file(tmp_path, mo
         read_log(path)
 
 
-def test_a_result_is_a_sequence_of_encounters(tmp_path):
+def test_result_is_a_sequence_of_encounters(tmp_path):
     ROWS.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
     result = read_log(tmp_path / "log.csv")
     (encounter,) = result

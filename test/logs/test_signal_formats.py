@@ -132,7 +132,7 @@ def test_sumo(tmp_path, recorded):
     check(encounter, ["J/west_0", "J/south_0"])
 
 
-def test_a_light_is_for_a_lane_and_a_movement(tmp_path):
+def test_light_is_for_lane_and_movement(tmp_path):
     vehicles = sumo(tmp_path)
     link = (
         '<connection from="west" to="{}" fromLane="0" toLane="0" tl="J" linkIndex="{}" dir="{}"/>'
@@ -158,7 +158,7 @@ def test_a_light_is_for_a_lane_and_a_movement(tmp_path):
     assert [light.turns for light in lights_of(network)] == [("left", "straight"), ()]
 
 
-def test_a_line_is_where_vehicles_stop_at_red(tmp_path):
+def test_line_is_where_vehicles_stop(tmp_path):
     file = tmp_path / "map.xml"
     file.write_text(crossing_map(["green:80 yellow:30 red:290", "red:130 green:270"], "", 2, -20))
     result = read_log(file)

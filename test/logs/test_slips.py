@@ -172,7 +172,7 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
 @pytest.mark.parametrize(
     ("change", "columns", "said", "options"), [(*row, {})[:4] for row in READ.values()], ids=READ
 )
-def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said, options):
+def test_table_is_read_as_driven(tmp_path, change, columns, said, options):
     (driven,) = read_log(save(crossing(), tmp_path)).encounters
     result = read_log(
         save(change(crossing()), tmp_path, "other.csv", **options), LogConfig(columns=columns)
@@ -229,7 +229,7 @@ def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
     assert sum(said in note for note in notes) == 1
 
 
-def test_a_doubt_stops_and_its_remedy_reads_on(tmp_path):
+def test_doubt_stops_and_remedy_reads_on(tmp_path):
     rows = crossing(rate=12.0).assign(t_s=lambda own: ((own.t_s - 1e3) * 24).round())
     path = save(rows, tmp_path)
     config = LogConfig(travel=0.0)
@@ -259,14 +259,14 @@ def test_runs_that_begin_anew_are_apart(tmp_path):
     assert len(found.encounters) == 2 and "the clock steps" in " ".join(found.quality.notes)
 
 
-def test_a_jump_without_speeds_is_not_driven(tmp_path):
+def test_jump_without_speeds_is_not_driven(tmp_path):
     rows = crossing(seconds=16.0, rate=2.0).drop(columns="speed_mps")
     rows.loc[(rows.vehicle_id == "a") & (rows.t_s > 1008.0), "y_m"] += 30.0
     result = read_log(save(rows, tmp_path))
     assert max(encounter.speed.max() for encounter in result.encounters) < 8.5
 
 
-def test_fixes_seconds_apart_do_not_refuse_the_log(tmp_path):
+def test_sparse_fixes_do_not_refuse_log(tmp_path):
     points = [
         (7.9, -3.4),
         (12.4, -4.2),
@@ -335,7 +335,7 @@ def test_layouts_of_tables(tmp_path, layout):
     np.testing.assert_allclose(encounter.position[:, 5:-5], plain.position[:, 5:-5], atol=0.5)
 
 
-def test_files_that_are_no_tables_and_days_apart(tmp_path):
+def test_foreign_files_and_days_are_apart(tmp_path):
     for name in "ab":
         (tmp_path / f"{name}.txt").write_text(pose_lines(crossing().query("vehicle_id == @name")))
     (tmp_path / "notes.txt").write_text("hello\n")
@@ -349,7 +349,7 @@ def test_files_that_are_no_tables_and_days_apart(tmp_path):
     assert len(read_log(paths).encounters) == 3
 
 
-def test_types_decide_sizes_and_may_be_missing_in_a_file(tmp_path):
+def test_types_decide_sizes_of_vehicles(tmp_path):
     rows = crossing().assign(type="car", length=1.0, width=0.8)
     save(rows.query("vehicle_id == 'a'"), tmp_path, "a.csv")
     save(crossing().query("vehicle_id == 'b'"), tmp_path, "b.csv")
@@ -358,7 +358,7 @@ def test_types_decide_sizes_and_may_be_missing_in_a_file(tmp_path):
     assert "1 m × 0.8 m is not the size of a car" in " ".join(result.quality.notes)
 
 
-def test_numbers_of_types_are_read_from_parquet(tmp_path):
+def test_type_numbers_are_read_from_parquet(tmp_path):
     crossing().assign(type=2).to_parquet(tmp_path / "log.parquet")
     (encounter,) = read_log(tmp_path / "log.parquet", columns="kind=type:car1+truck2")
     assert {vehicle.type for vehicle in encounter.vehicles} == {"truck"}
@@ -390,7 +390,7 @@ def test_packed_logs(tmp_path, ending):
         read_log(path)
 
 
-def test_files_without_a_vehicle_column_are_one_vehicle_each(tmp_path):
+def test_files_without_ids_are_vehicles(tmp_path):
     rows = plain(crossing())
     for name in ("a", "b"):
         rows[rows.id == name].drop(columns="id").to_csv(tmp_path / f"car_{name}.csv", index=False)
@@ -474,7 +474,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
 @pytest.mark.parametrize(
     ("change", "said", "options"), [(*row, {})[:3] for row in REFUSED.values()], ids=REFUSED
 )
-def test_what_cannot_be_read_says_what_to_do(tmp_path, change, said, options):
+def test_unreadable_files_have_a_remedy(tmp_path, change, said, options):
     columns = "point=roof" if said.startswith("point") else ""
     with pytest.raises(InputError) as error:
         read_log(save(change(crossing()), tmp_path, **options), LogConfig(columns=columns))

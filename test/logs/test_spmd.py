@@ -59,7 +59,7 @@ def test_a_folder_of_transmitted_files(tmp_path):
     assert result.quality.rows == 242
 
 
-def test_with_a_header_it_is_a_table(tmp_path):
+def test_with_header_it_is_a_table(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("\n".join([",".join(SPMD_COLUMNS), *messages(crossing())]) + "\n")
     (encounter,) = read_log(path).encounters
@@ -67,7 +67,7 @@ def test_with_a_header_it_is_a_table(tmp_path):
     assert [vehicle.id for vehicle in encounter.vehicles] == ["11", "12"]
 
 
-def test_a_heading_of_a_vehicle_that_stands_is_taken_from_the_messages(tmp_path):
+def test_standing_vehicle_has_its_messages_heading(tmp_path):
     rows = crossing()
     rows.loc[rows["vehicle_id"] == "b", ["x_m", "y_m", "speed_mps"]] = (10.0, -12.0, 0.0)
     path = tmp_path / "log.csv"

@@ -76,7 +76,7 @@ def test_parquet_and_other_separators(tmp_path):
         np.testing.assert_array_equal(other.position, plain.position)
 
 
-def test_latitude_and_longitude_become_east_and_north(tmp_path):
+def test_latitude_and_longitude_become_local(tmp_path):
     (plain,) = read_log(save(crossing(), tmp_path)).encounters
     (other,) = read_log(save(geographic(crossing()), tmp_path)).encounters
     assert other.origin == pytest.approx((48.0, 11.0), abs=0.001)
@@ -169,7 +169,7 @@ def test_frames_cannot_be_mixed(tmp_path):
 
 @pytest.mark.parametrize("lon", [174.8, -179.5, 11.6])
 @pytest.mark.parametrize("lat", [-41.3, 88.0, 0.2])
-def test_degrees_that_are_called_metres_are_refused(tmp_path, lon, lat):
+def test_degrees_named_as_metres_are_refused(tmp_path, lon, lat):
     """From New Zealand to the pole: as metres nobody would move."""
     rows = [
         f"{k / 10},{who},{lon + 1e-5 * k},{lat + shift},10"
@@ -182,7 +182,7 @@ def test_degrees_that_are_called_metres_are_refused(tmp_path, lon, lat):
         read_log(path)
 
 
-def test_files_of_the_current_folder_are_named_after_it(tmp_path, monkeypatch):
+def test_current_folder_names_its_log(tmp_path, monkeypatch):
     (tmp_path / "drives").mkdir()
     monkeypatch.chdir(tmp_path / "drives")
     for vehicle in "ab":

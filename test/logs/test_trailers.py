@@ -35,7 +35,7 @@ def log(tmp_path, *, kind="trailer", slower=0.0, trailer=None):
 
 
 @pytest.mark.parametrize("kind, trailer", [("trailer", None), ("truck", None), ("car", "tl")])
-def test_what_keeps_its_distance_is_a_trailer(tmp_path, kind, trailer):
+def test_what_keeps_distance_is_a_trailer(tmp_path, kind, trailer):
     result = log(tmp_path, kind=kind, trailer=trailer)
     (encounter,) = result.encounters
     truck = encounter.vehicles[encounter.ids.index("t")]

@@ -27,13 +27,13 @@ def expected(encounter):
     return sg.generate(encounter, "four_way", count=1)
 
 
-def test_a_log_a_path_and_a_table_with_one_encounter_are_that_encounter(expected):
+def test_log_path_and_table_are_equal(expected):
     for source in (sg.read_log(LOG), str(LOG), pd.read_csv(LOG)):
         made = sg.generate(source, "four_way", count=1)
         assert np.array_equal(made, expected)
 
 
-def test_equal_calls_are_equal_and_an_array_has_positions_headings_and_speeds(encounter, expected):
+def test_equal_calls_are_equal(encounter, expected):
     made = sg.generate(encounter, "four_way", {"sampling": {"lateral_sigma": 0.2}}, count=1)
     assert expected == sg.generate(encounter, "four_way", count=1) != made
     array = np.asarray(expected[0])
@@ -41,13 +41,13 @@ def test_equal_calls_are_equal_and_an_array_has_positions_headings_and_speeds(en
     assert np.array_equal(array[..., 3], expected[0].speed)
 
 
-def test_a_drawn_seed_is_in_the_result_and_progress_is_printed(encounter, capsys):
+def test_drawn_seed_and_progress_are_shown(encounter, capsys):
     made = sg.generate(encounter, "four_way", count=1, seed=None, progress=True)
     assert np.array_equal(made, sg.generate(encounter, "four_way", count=1, seed=made.seed))
     assert "1 of 1 scenarios" in capsys.readouterr().err
 
 
-def test_a_text_or_a_mapping_is_a_request():
+def test_text_or_mapping_is_a_request():
     for request in ("pet=1..2", {"target": "pet=1..2"}):
         made = sg.generate(LOG, Path("four_way"), count=1, request=request)
         assert made.measures().pet.between(1.0, 2.0).all()
@@ -69,17 +69,13 @@ def test_a_text_or_a_mapping_is_a_request():
         (lambda e: sg.trials_of(e, ego="2"), "trials_of: a result"),
     ],
 )
-def test_other_arguments_are_refused_in_one_line(encounter, call, message):
+def test_other_arguments_are_refused(encounter, call, message):
     with pytest.raises(sg.InputError, match=message) as refused:
         call(encounter)
     assert "\n" not in str(refused.value)
 
 
-def test_a_log_with_several_encounters_asks_for_one(encounter):
+def test_log_with_several_encounters_is_refused(encounter):
     log = sg.LogResult((encounter, encounter), None)
     with pytest.raises(sg.InputError, match="has 2 encounters: give one of them"):
         sg.generate(log, "four_way")
-
-
-def test_only_public_names_are_listed():
-    assert set(dir(sg)) == {"__version__", *sg.__all__}

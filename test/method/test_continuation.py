@@ -24,7 +24,7 @@ def cut_in_the_area(kind, seconds=0.3, seed=0):
 
 
 @pytest.mark.parametrize("kind", ["crossing, stops", "left turn before oncoming, stops"])
-def test_a_vehicle_drives_on_until_its_tail_has_left(kind):
+def test_vehicle_is_continued_beyond_the_area(kind):
     whole, cut, first = cut_in_the_area(kind)
     made, (note,) = driven_on(cut)
     assert f"vehicle {whole.vehicles[first].id} drives on" in str(note)
@@ -44,7 +44,7 @@ def test_a_vehicle_drives_on_until_its_tail_has_left(kind):
         assert scenario.time[scenario.present[first, 1]] > conflict.exit_first
 
 
-def test_nobody_knows_how_a_vehicle_goes_on_that_stands_in_the_area():
+def test_standing_in_area_is_refused():
     _, cut, first = cut_in_the_area("crossing, stops")
     speed, position = cut.speed.copy(), cut.position.copy()
     end = cut.present[first, 1]

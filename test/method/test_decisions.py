@@ -16,7 +16,6 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.trials import run_trials, trials_of
 from scenario_gen.method.decisions import DecidedConflict, goes_first_probability, offered_lags
-from scenario_gen.method.drives import recorded_drive
 from scenario_gen.method.outcome_sets import drawn_sizes, requested_decisions
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.situation import conflict_of, passing, Situation
@@ -40,7 +39,7 @@ def first_to_enter(scenario):
     return scenario.vehicles[conflict_of(scenario, 0, 1).first].id
 
 
-def test_the_probabilities_of_the_outcomes_add_up_to_one():
+def test_probabilities_add_up_to_one():
     for kind in (WAITS, "left turn before oncoming, stops", "merges"):
         decisions = sg.decisions_of(recorded(kind))
         refused = sum(each.probability for each, _ in decisions.refused)
@@ -50,7 +49,7 @@ def test_the_probabilities_of_the_outcomes_add_up_to_one():
         assert all(reason for _, reason in decisions.refused)
 
 
-def test_who_goes_first_follows_the_law_of_the_offered_lag():
+def test_first_goer_follows_the_law():
     lags = np.array(offered_lags(3.0))
     assert lags.std() == pytest.approx(3.0, rel=0.1) and lags.sum() == pytest.approx(0.0)
     assert goes_first_probability(0.0, 0.8) == 0.5
@@ -67,7 +66,7 @@ def test_who_goes_first_follows_the_law_of_the_offered_lag():
     assert patient == pytest.approx(bold) == pytest.approx(0.5), "the lags are symmetric"
 
 
-def test_the_sizes_of_the_sets_follow_the_probabilities():
+def test_set_sizes_follow_probabilities():
     decisions = sg.decisions_of(recorded()).possible
     sizes = np.array([drawn_sizes(decisions, 50, seed) for seed in range(200)])
     shares = np.array([decision.probability for decision in decisions])
@@ -78,7 +77,7 @@ def test_the_sizes_of_the_sets_follow_the_probabilities():
     assert chi_square.sum(axis=1).mean() == pytest.approx(len(shares) - 1, rel=0.25)
 
 
-def test_the_drawn_order_holds_in_all_scenarios(sets):
+def test_drawn_order_holds_throughout(sets):
     assert sum(map(len, sets)) == 12 and len(sets) == 4
     for result in sets:
         decision = result.encounter.decision
@@ -93,7 +92,7 @@ def test_the_drawn_order_holds_in_all_scenarios(sets):
         assert stands == (decision.outcome is Outcome.STOPS)
 
 
-def test_a_decided_driver_goes_first_as_people_do():
+def test_decided_drivers_go_first_like_people():
     encounter = recorded()
     (first,) = (
         decision
@@ -113,14 +112,7 @@ def test_a_decided_driver_goes_first_as_people_do():
     assert np.median(away[made.present_slice(row)]) < 0.6, "it stays on its recorded path"
 
 
-def test_the_recorded_outcome_is_the_recording():
-    encounter = recorded()
-    made = sg.decided(encounter, sg.decisions_of(encounter).possible[0])
-    assert made.name == encounter.name and made.recording == encounter.name
-    np.testing.assert_array_equal(made.position, encounter.position)
-
-
-def test_what_cannot_be_decided_is_refused_by_name():
+def test_undecidable_conflicts_are_refused():
     crossing = recorded(seed=1)
     conflict = Situation.of(crossing).conflicts[0]
     inside = round(conflict.entry_second / crossing.dt) + 2
@@ -163,14 +155,14 @@ def lag_of(encounter):
     return DecidedConflict.of(encounter).lag
 
 
-def test_the_offered_lag_frees_both_drivers_before_either_has_decided():
+def test_offered_lag_precedes_the_decision():
     rolls = crossing((0.0, 10.0), (2.0, 10.0), (5.0, 3.0), (9.0, 3.0), (12.0, 10.0))
     stops = crossing((0.0, 10.0), (2.5, 10.0), (6.5, 0.0), (9.0, 0.0), (14.0, 10.0))
     assert lag_of(rolls) == pytest.approx(1.5, abs=0.1), "15 m at 10 m/s"
     assert lag_of(stops) == pytest.approx(lag_of(rolls), abs=0.2)
 
 
-def test_a_driver_who_stands_at_its_line_decides_when_the_other_one_is_near():
+def test_standing_driver_decides_at_the_approach():
     begins = (-60.0, -100.0)
     lags = [
         lag_of(crossing((0, 0), (start, 0), (start + 5, 8), first_begin=begin, second_begin=-9.0))
@@ -180,7 +172,7 @@ def test_a_driver_who_stands_at_its_line_decides_when_the_other_one_is_near():
     assert goes_first_probability(lags[0], 0.8) == pytest.approx(0.5, abs=0.2)
 
 
-def test_a_wider_gap_is_not_refused_where_a_narrower_one_is_taken():
+def test_wider_gap_is_taken_before_narrower():
     for kind in REACTIONS:
         decisions = sg.decisions_of(recorded(kind))
         refused = {each.lag for each, _ in decisions.refused if each.outcome == "goes first"}
@@ -189,7 +181,7 @@ def test_a_wider_gap_is_not_refused_where_a_narrower_one_is_taken():
 
 
 @pytest.mark.parametrize("kind", ["crossing, rolls", WAITS])
-def test_a_record_that_ends_in_the_area_is_driven_on(kind):
+def test_record_ending_in_area_is_continued(kind):
     encounter = recorded(kind, 1)
     (conflict,) = Situation.of(encounter).conflicts
     brief = encounter.between(0, round((conflict.entry_second + 0.5) / encounter.dt))
@@ -203,39 +195,6 @@ def test_a_record_that_ends_in_the_area_is_driven_on(kind):
     clears, enters = passing(made, new, merges=new.following)
     assert enters - clears >= 1.0
     assert made.time[made.present[new.first, 1]] >= clears + 1.0
-
-
-def test_nobody_knows_how_a_turn_goes_on_that_has_just_begun():
-    turning = recorded("right turn into a stream", 1)
-    (conflict,) = Situation.of(turning).conflicts
-    brief = turning.between(0, round((conflict.entry_second + 0.5) / turning.dt))
-    assert "begins to turn when its recording ends" in sg.decisions_of(brief).why
-
-
-def test_a_record_that_begins_slowly_is_approached_and_not_crept():
-    slow = crossing((0, 1), (7, 1), (12, 10), first_begin=-65.0, second_begin=-12.0)
-    (track,) = (track for track in Situation.of(slow).tracks if track.vehicle.id == "j")
-    drive = recorded_drive(track)
-    before = drive.speed[drive.station < 0.0]
-    assert before[0] > 8.0 and np.all(np.diff(before) <= 1e-9), "it brakes from its free speed"
-
-
-def test_a_driver_who_stopped_departs_when_the_way_is_free():
-    encounter = recorded()
-    (stops,) = (
-        decision
-        for decision in sg.decisions_of(encounter).possible
-        if decision.outcome is Outcome.STOPS
-    )
-    for lag in (0.0, -0.85):
-        try:
-            made = DecidedConflict.of(encounter).meeting(
-                replace(stops, outcome=Outcome.GOES_SECOND, lag=lag)
-            )
-        except sg.RefusedError:
-            continue
-        (conflict,) = Situation.of(made.encounter).conflicts
-        assert 1.0 <= conflict.encroachment <= 4.0
 
 
 def test_one_set_has_one_outcome():

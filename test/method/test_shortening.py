@@ -70,9 +70,7 @@ class ShortRoad(Generation):
 
 
 @pytest.mark.parametrize("is_planned", [False, True])
-def test_the_smallest_loss_that_fits_is_used_and_noted(
-    crossing: Encounter, is_planned: bool
-) -> None:
+def test_smallest_loss_that_fits_is_used(crossing: Encounter, is_planned: bool) -> None:
     situation = Situation.of(crossing)
     longest = max(track.travelled for track in situation.tracks)
     short_road = ShortRoad(limit=0.95 * longest, is_planned=is_planned)
@@ -96,7 +94,7 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(
     assert error.result.encounter.duration == caught.value.result.encounter.duration
 
 
-def test_the_beginning_of_a_braking_is_the_last_that_is_lost(crossing: Encounter) -> None:
+def test_braking_is_lost_last(crossing: Encounter) -> None:
     situation = Situation.of(crossing)
     windows, shorter = (
         interaction_windows(situation, whole_braking=kept) for kept in (True, False)

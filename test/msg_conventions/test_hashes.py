@@ -15,7 +15,7 @@ from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import InputError
 
 
-def test_a_road_of_the_same_geometry_differs_in_the_templates_hash_only():
+def test_same_geometry_changes_template_hash_only():
     road = hand_made_run().road
     first, second = (
         {"tracks": encode_tracks(e), "map": encode_map(road, e.start_ns)}
@@ -30,7 +30,7 @@ def test_a_road_of_the_same_geometry_differs_in_the_templates_hash_only():
     assert hash_of("map", first["map"] + b"\x00") == one["map_hash"]
 
 
-def test_a_document_says_what_it_belongs_to():
+def test_document_names_its_inputs():
     run = hand_made_run()
     grid = encode_map(run.road, 5)
     road = encode_description(run.road, grid, 5)

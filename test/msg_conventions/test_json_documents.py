@@ -35,7 +35,7 @@ FACTS = Facts(
 )
 
 
-def test_values_that_differ_from_the_defaults_are_there_and_exact():
+def test_changed_values_are_exact():
     data = encode_document(FACTS)
     assert len(data) % 4 == 0 and decode_document(Facts, data, "facts") == FACTS
     said = json_of(data, "facts")

@@ -14,7 +14,6 @@ from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import canonical_heading
 from scenario_gen.roads import build_road
 from scenario_gen.types import Vehicle
 
@@ -40,7 +39,7 @@ def _tracks(vehicles: int, samples: int, frame: str = "local_enu") -> bytes:
         (1, 5, r"1 vehicle\(s\) and 5 sample\(s\); at least 2 of each"),
     ],
 )
-def test_tracks_of_nobody_or_of_an_instant(vehicles, samples, words):
+def test_empty_tracks_are_refused(vehicles, samples, words):
     with pytest.raises(InputError, match=words):
         decode_tracks(_tracks(vehicles, samples))
 
@@ -53,7 +52,7 @@ def test_tracks_of_nobody_or_of_an_instant(vehicles, samples, words):
         ((0,), r"1 point\(s\); at least 2"),
     ],
 )
-def test_scenarios_say_which_rule_of_time_is_broken(time_ns, words):
+def test_broken_rule_of_time_is_named(time_ns, words):
     flat = np.zeros((1, len(time_ns)))
     sent = Trajectory(
         7,
@@ -69,7 +68,7 @@ def test_scenarios_say_which_rule_of_time_is_broken(time_ns, words):
         decode_scenario(trajectory.encode(sent))
 
 
-def test_routes_of_no_poses_or_of_earlier_ones():
+def test_routes_without_ordered_poses():
     for count, words in (
         (0, "the path holds no poses"),
         (2, "pose 1 bears an earlier stamp than pose 0"),
@@ -105,32 +104,3 @@ def test_empty_frames_and_quaternions_of_zeros(kind):
         decode(data.replace(UNTURNED, bytes(32)))
     with pytest.raises(InputError, match=rf"{kind}: header\.frame_id is empty; name the frame"):
         decode(_messages("")[kind][1])
-
-
-@pytest.mark.parametrize("frame", ["a", "ab", "abc", "abcd", "abcde", "abcdefgh"])
-def test_points_that_are_not_alike_are_read_one_by_one_to_the_same_values(frame, monkeypatch):
-    data = trajectory.encode(_moving(frame))
-    at_once = trajectory.decode(data, "tracks")
-    monkeypatch.setattr(trajectory, "MAX_TABLE_VEHICLES", 0)
-    one_by_one = trajectory.decode(data, "tracks")
-    for name in ("time_ns", "position", "heading", "speed", "acceleration"):
-        assert getattr(at_once, name).tobytes() == getattr(one_by_one, name).tobytes()
-    for name in ("time_ns", "position", "speed", "acceleration"):
-        assert getattr(at_once, name).tobytes() == getattr(_moving(frame), name).tobytes()
-
-
-def _moving(frame: str) -> Trajectory:
-    random = np.random.Generator(np.random.PCG64(3))
-    values = (
-        canonical_heading(random.uniform(-3.0, 3.0, (3, 5))),
-        *random.uniform(0.0, 20.0, (2, 3, 5)),
-    )
-    named = tuple(Vehicle(name) for name in ("a", "bc", "def"))
-    return Trajectory(
-        7,
-        frame,
-        named,
-        np.arange(5) * 1_500_000_000,
-        random.uniform(-9.0, 9.0, (3, 5, 2)),
-        *values,
-    )

@@ -18,9 +18,7 @@ NEAR = st.floats(-6.0, 6.0)
 
 
 @given(NUMBER, NUMBER, NUMBER, st.floats(1.0, 20.0), st.floats(1.0, 5.0))
-def test_corners_are_those_of_a_rectangle_about_its_pose_counter_clockwise(
-    x, y, yaw, length, width
-):
+def test_corners_form_a_ccw_rectangle(x, y, yaw, length, width):
     ring = shapely.LinearRing(corners(np.array([[x, y, yaw]]), length, width)[0])
     box = shapely.Polygon(ring)
     assert ring.is_ccw and box.area == pytest.approx(length * width)
@@ -28,7 +26,7 @@ def test_corners_are_those_of_a_rectangle_about_its_pose_counter_clockwise(
 
 
 @given(NEAR, NEAR, NUMBER, NUMBER)
-def test_gaps_and_distances_are_those_of_polygons(x, y, yaw, other_yaw):
+def test_gaps_are_those_of_polygons(x, y, yaw, other_yaw):
     cars, poses = (
         (Vehicle("a"), Vehicle("b", 7.0, 2.4)),
         np.array([[x, y, yaw], [0.0, 0.0, other_yaw]]),

@@ -43,7 +43,7 @@ def test_the_same_as_over_all_edges(seed, scale, whole):
         assert one.tobytes() == other.tobytes()
 
 
-def test_a_long_curve_is_projected_on_piece_by_piece():
+def test_long_curve_is_projected_piecewise():
     """Ten kilometres in half metres: over all edges it would be a table of 3 GB."""
     s = np.arange(0.0, 10_000.0, 0.5)
     curve = Curve(np.column_stack((s, 5.0 * np.sin(s / 50.0), np.arctan(0.1 * np.cos(s / 50.0)))))

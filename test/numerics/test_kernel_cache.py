@@ -44,7 +44,7 @@ def compiled(package, cache):
     return int(hits), text
 
 
-def test_a_copy_of_the_package_compiles_nothing_and_a_damaged_cache_is_repaired(tmp_path):
+def test_kernel_cache_is_shared_and_repaired(tmp_path):
     cache = tmp_path / "cache"
     assert compiled(ROOT, cache) == (
         0,
@@ -64,7 +64,7 @@ def test_a_copy_of_the_package_compiles_nothing_and_a_damaged_cache_is_repaired(
     assert f"at every start: other accounts may write to {cache}; run `chmod go-w" in text
 
 
-def test_an_own_folder_is_no_link_and_of_this_account(tmp_path):
+def test_cache_folder_belongs_to_this_account(tmp_path):
     own_folder(tmp_path / "new")
     assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
     (tmp_path / "link").symlink_to(tmp_path / "new")

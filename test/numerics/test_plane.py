@@ -23,20 +23,20 @@ NUMBER = st.floats(-100.0, 100.0)
 
 
 @given(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER)
-def test_what_is_placed_ahead_and_to_the_left_is_seen_there(x, y, yaw, ahead, left):
+def test_placed_points_are_seen_there(x, y, yaw, ahead, left):
     at = place(np.array([x, y, yaw]), ahead, left)
     assert np.allclose(ahead_and_left(at - np.array([x, y]), yaw), (ahead, left), atol=1e-9)
     assert np.allclose(at, np.array([x, y]) + ahead * unit(yaw) + left * unit_left(yaw), atol=1e-9)
 
 
 @given(NUMBER, NUMBER)
-def test_an_angle_between_two_is_wrapped_and_turns_one_into_the_other(angle, other):
+def test_wrapped_angle_turns_between_two(angle, other):
     between = angle_between(angle, other)
     assert -np.pi <= between < np.pi
     assert np.allclose(unit(other + between), unit(angle), atol=1e-9)
 
 
-def test_a_polyline_is_had_again_from_its_directions_and_lengths():
+def test_polyline_is_rebuilt_from_its_directions():
     yaw = np.linspace(0.0, 1.0, 201)
     points = polyline_of(yaw, 0.05)
     assert np.allclose(
@@ -48,7 +48,7 @@ def test_a_polyline_is_had_again_from_its_directions_and_lengths():
     assert np.allclose(polyline_of(yaw, edge_lengths(points)), points)
 
 
-def test_lines_meet_at_their_shares_and_parallel_ones_nowhere():
+def test_lines_meet_at_their_shares():
     p, u, v = np.zeros(2), np.array([4.0, 0.0]), np.array([0.0, 2.0])
     t, s, cross = meeting_shares(p, u, np.array([1.0, -1.0]), v)
     assert (t, s, cross) == (0.25, 0.5, 8.0)

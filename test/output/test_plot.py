@@ -18,7 +18,7 @@ def lines(axes):
     return [line for line in axes.get_lines() if len(line.get_xdata()) > 1]
 
 
-def test_each_vehicle_of_each_scenario_is_a_line_in_its_colour_on_the_road():
+def test_each_vehicle_is_drawn_in_colour():
     made = hand_made_run()
     axes = made.plot()
     drawn = lines(axes)
@@ -32,7 +32,7 @@ def test_each_vehicle_of_each_scenario_is_a_line_in_its_colour_on_the_road():
     ]
 
 
-def test_one_scenario_or_the_record_is_drawn_on_axes_that_are_given():
+def test_scenario_is_drawn_on_given_axes():
     made = hand_made_run()
     own = matplotlib.figure.Figure().add_subplot()
     assert made[3].plot(own) is own and len(lines(own)) == 2 and not own.get_images()
@@ -45,12 +45,7 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch):
         hand_made_run().plot()
 
 
-def test_a_road_is_drawn_alone():
-    axes = hand_made_run().road.plot()
-    assert axes.get_title() == "straight" and axes.get_images() and not lines(axes)
-
-
-def test_a_scenario_becomes_an_animation_in_real_time(tmp_path):
+def test_scenario_becomes_an_animation(tmp_path):
     made = hand_made_run()
     with Image.open(made.animate(tmp_path / "film.gif", 3)) as film:
         assert film.n_frames * film.info["duration"] / 1000 == pytest.approx(

@@ -9,7 +9,6 @@ from support.map_builders import lanelet2, opendrive
 from support.source_files import ROOT
 from typer.testing import CliRunner
 
-from scenario_gen import bundled, generate, read_log
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.output.plot import draw_map
@@ -31,19 +30,7 @@ def test_a_map_is_drawn_and_described(tmp_path, suffix, text):
     assert said[0].startswith(f"a & <b>: {len(network.lanes)} lanes, ")
 
 
-def test_the_places_that_are_named_take_the_template(tmp_path):
-    (encounter,) = read_log(bundled("b")).encounters
-    path = tmp_path / "town.osm"
-    path.write_text(lanelet2())
-    said = draw_map(str(path), tmp_path / "map.png", encounter)
-    places = [line for line in said if line.startswith("place ")]
-    assert places or [line for line in said if line.startswith("no place for ")]
-    if places:
-        part = places[0].rpartition("--road '")[2].strip("'")
-        assert generate(encounter, part, count=1).road is not None
-
-
-def test_built_in_roads_are_listed_and_those_that_suit(tmp_path):
+def test_suitable_built_in_roads_are_listed(tmp_path):
     log = ROOT / "examples" / "my_log.csv"
     assert (
         run("roads")

@@ -15,7 +15,7 @@ HEADER = re.compile(
 
 @pytest.mark.copyright
 @pytest.mark.linter
-def test_every_source_file_names_its_holder_and_licence():
+def test_source_files_name_holder_and_licence():
     texts = {path: path.read_text(encoding="utf-8") for path in python_files()}
     bare = [
         str(path.relative_to(ROOT))

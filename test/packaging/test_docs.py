@@ -26,7 +26,7 @@ def anchors(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_files_links_and_targets_of_a_page_are_there(page):
+def test_links_of_a_page_lead_somewhere(page):
     text = page.read_text()
     named = {
         name
@@ -48,7 +48,7 @@ def test_files_links_and_targets_of_a_page_are_there(page):
     assert set(re.findall(r"`make ([a-z]+)", text)) <= targets
 
 
-def test_every_function_that_contributing_names_is_in_its_file():
+def test_contributing_names_existing_functions():
     rows = re.findall(
         r"^\|.*\| `(scenario_gen/[\w/]+\.py)` \| (`.*?`) \|$",
         (ROOT / "CONTRIBUTING.md").read_text(),

@@ -68,19 +68,6 @@ def test_the_core_works_without_any_extra(tmp_path):
     assert not set(told["loaded"]) & set(EXTRA_MODULES)
 
 
-def test_the_command_names_the_extra_that_it_lacks():
-    ran = python(
-        "-c",
-        "import sys; sys.modules['typer'] = None; from scenario_gen.__main__ import main; main()",
-    )
-    assert (ran.returncode, ran.stdout) == (1, "")
-    assert (
-        ran.stderr
-        == "error: typer not installed; install it with the extra: `pip install '.[cli]'` "
-        "in a checkout, or `pip install 'scenario_gen[cli]'`\n"
-    )
-
-
 def write_csv(path):
     """Write the bundled case a as a table, which the core alone reads."""
     (encounter,) = read_log(bundled("a")).encounters

@@ -27,6 +27,7 @@ BANNED = {
     "minded", "onward", "hardly", "thereof", "late", "take", "give", "tell", "say", "hear",
     "settle", "let_go", "askew", "aside",
 }  # fmt: skip
+TEST_NAME_WORDS = 6
 
 
 def has_unit(name: str) -> bool:
@@ -77,4 +78,15 @@ def test_constants_say_their_unit():
         for path in PYTHON_FILES
         for name, _ in constants(path)
         if not has_unit(name)
+    ]
+
+
+def test_names_of_tests_are_short():
+    assert not [
+        f"{path.relative_to(ROOT)}: {node.name}"
+        for path in (ROOT / "test").rglob("test_*.py")
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.FunctionDef)
+        and node.name.startswith("test_")
+        and node.name.count("_") > TEST_NAME_WORDS
     ]

@@ -62,7 +62,7 @@ LONG = ("tutorial_planner", "howto_planner", "howto_failures", "howto_archives")
     ],
     ids=lambda page: page.stem,
 )
-def test_commands_of_a_page_run_and_print_what_it_shows(page, place, monkeypatch, capsys):
+def test_page_commands_print_what_is_shown(page, place, monkeypatch, capsys):
     for language, text in blocks(page):
         if language == "python":
             (place / text.partition("\n")[0].removeprefix("# ")).write_text(text)
@@ -85,14 +85,14 @@ def test_python_of_the_readme_runs(place, capsys):
     assert capsys.readouterr().out == shown
 
 
-def test_python_of_the_page_on_interaction_prints_what_it_shows(place, capsys):
+def test_interaction_page_prints_its_output(place, capsys):
     page = (ROOT / "docs" / "interaction.md").read_text()
     ((_, text),) = blocks("docs/interaction.md")
     exec(text, {})
     assert f"\n    {capsys.readouterr().out}" in page
 
 
-def test_the_tables_of_the_reference_are_the_code_s():
+def test_reference_tables_are_current():
     """Only names are compared, so a better help text needs no new table at once."""
     for name, text in runpy.run_path(ROOT / "docs" / "tables.py")["tables"]().items():
         written = (ROOT / "docs" / "tables" / name).read_text()
@@ -101,7 +101,7 @@ def test_the_tables_of_the_reference_are_the_code_s():
 
 
 @pytest.mark.usefixtures("place")
-def test_the_tasks_of_the_library_run_and_are_short():
+def test_library_tasks_run():
     pytest.importorskip("matplotlib").use("Agg")
     found = [
         text

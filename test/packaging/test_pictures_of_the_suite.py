@@ -22,7 +22,7 @@ TYPES = {
 }
 
 
-def test_rviz_shows_topics_of_the_suite_with_their_types_and_quality():
+def test_rviz_shows_topics_of_suite():
     manager = yaml.safe_load((CONFIG / "suite.rviz").read_text())["Visualization Manager"]
     shown = {d["Topic"]["Value"]: d for d in manager["Displays"] if "Topic" in d}
     assert {"map", "posterior", "vehicle_1/route", "vehicle_1/footprint", "markers"} <= set(shown)
@@ -38,7 +38,7 @@ def test_rviz_shows_topics_of_the_suite_with_their_types_and_quality():
     assert manager["Global Options"]["Fixed Frame"] == "map"
 
 
-def test_foxglove_shows_topics_of_the_suite_and_every_panel_is_placed():
+def test_foxglove_layout_fits_the_suite():
     layout = json.loads((CONFIG / "suite_foxglove.json").read_text())
     for name, panel in layout["configById"].items():
         for topic, settings in panel.get("topics", {}).items():

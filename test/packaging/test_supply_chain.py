@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 from support.source_files import ROOT
 
 
-def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets():
+def test_run_time_bounds_meet_the_lock():
     pins = locked()
     for wanted in run_time():
         assert [one.operator for one in wanted.specifier] == [">="], wanted
@@ -45,14 +45,14 @@ def test_all_extras_are_in_all():
     assert set(project["optional-dependencies"]) <= included | {"ros", "test"}
 
 
-def test_what_locks_pin_has_one_version_in_all_of_them_and_for_every_python():
+def test_locks_pin_one_version():
     """They are installed one after the other; what a sourced Jazzy has itself is apart."""
     assert not {name: versions for name, versions in locked().items() if "," in versions}
     for name in ("core", "run", "extras", "test"):
         assert not re.findall(r"^ros-", (REQUIREMENTS / f"{name}.lock").read_text(), re.MULTILINE)
 
 
-def test_locks_have_hashes_and_name_no_place():
+def test_locks_have_hashes():
     for path in REQUIREMENTS.glob("*.lock"):
         pinned = re.findall(r"^\S+==.*$", text := path.read_text(), re.MULTILINE)
         assert pinned and all(line.endswith("\\") for line in pinned), (
@@ -61,7 +61,7 @@ def test_locks_have_hashes_and_name_no_place():
         assert "://" not in text, path.name
 
 
-def test_every_locked_package_is_listed_with_its_licence():
+def test_locked_packages_have_licences():
     with TABLE.open(newline="") as file:
         rows = list(csv.reader(file))[1:]
     assert {name: version for name, version, *_ in rows} == locked(), "make licences"

@@ -47,7 +47,7 @@ def test_other_text_is_refused_and_named(name, texts):
             Request(**{name: text})
 
 
-def test_vehicles_are_found_by_id_and_by_ros_name_and_unknown_ones_listed(chain):
+def test_vehicles_are_found_by_id(chain):
     rows = Request(goals="2: 1 2 3").rows("goals", chain.encounter)
     assert (
         np.isnan(rows[0]).all()

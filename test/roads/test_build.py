@@ -20,7 +20,7 @@ ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
 @pytest.mark.parametrize("name", list(ARMS))
 @pytest.mark.parametrize("lanes", [1, 2])
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_one_entry_and_one_exit_per_lane_on_the_right_side(name, lanes, side):
+def test_one_entry_and_exit_per_lane(name, lanes, side):
     road = build_road(name, None, RoadConfig(lanes=lanes, traffic_side=side))
     assert len(road.entries) == len(road.exits) == ARMS[name] * lanes
     width, height = road.drivable.shape[1] * 0.2, road.drivable.shape[0] * 0.2
@@ -43,7 +43,7 @@ def test_one_entry_and_one_exit_per_lane_on_the_right_side(name, lanes, side):
 
 
 @pytest.mark.parametrize("name", ["t_intersection", "four_way"])
-def test_corners_are_rounded_with_the_asked_radius(name):
+def test_corners_have_their_stated_radius(name):
     sharp = build_road(name, None, RoadConfig(lanes=1, corner_radius=5.0)).drivable
     round_ = build_road(name, None, RoadConfig(lanes=1, corner_radius=9.0)).drivable
     corners = 2 if name == "t_intersection" else 4
@@ -61,7 +61,7 @@ def test_resolution_and_arm_length_are_kept():
 
 
 @pytest.mark.parametrize("name", ["straight", "t_intersection"])
-def test_paper_versions_have_a_thousand_cells_a_side(name):
+def test_paper_roads_have_1000_cells(name):
     road = build_road(name, None, RoadConfig(paper=True))
     assert road.drivable.shape == (1000, 1000)
     assert road.resolution == 1.0
@@ -77,7 +77,7 @@ def test_unknown_and_impossible_roads_are_named():
 
 
 @pytest.mark.parametrize("path", LOGS)
-def test_every_recorded_encounter_has_a_corridor_in_which_its_separated_paths_fit(path):
+def test_recorded_encounters_fit_their_corridors(path):
     (encounter,) = read_log(path).encounters
     road = build_road("corridor", encounter)
     separation = Situation.of(encounter).separation

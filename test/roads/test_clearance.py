@@ -52,7 +52,7 @@ def blocked_space(road):
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("density", [0.0, 0.02, 0.3, 0.8])
-def test_field_is_the_distance_to_the_nearest_blocked_square(seed, density):
+def test_field_is_distance_to_blocked_squares(seed, density):
     rng = np.random.default_rng([seed, int(density * 100)])
     road = random_road(rng, (rng.integers(1, 20), rng.integers(1, 20)), density)
     blocked = blocked_space(road)
@@ -87,7 +87,7 @@ def test_segments_against_shapely(radius):
     assert seen == {True, False}
 
 
-def test_a_segment_may_not_slip_between_two_squares_that_touch_at_a_corner():
+def test_segment_does_not_slip_through_corners():
     road = road_of([[1, 0], [0, 1]])
     assert not segments_free(road, np.array([[0.5, 0.5]]), np.array([[1.5, 1.5]]), 0.0)[0]
 
@@ -115,7 +115,7 @@ def test_footprints_against_shapely():
     assert seen == {True, False}
 
 
-def test_a_footprint_may_touch_but_not_leave():
+def test_footprint_may_touch_but_not_leave():
     road = road_of(np.ones((4, 10)), resolution=0.5)
     assert footprint_fits(road, np.array([[2.5, 1.0, 0.0]]), 5.0, 2.0)[0]
     assert not footprint_fits(road, np.array([[2.5, 1.0, 0.0]]), 5.0, 2.001)[0]
@@ -135,7 +135,7 @@ def test_components_need_the_width():
     assert FreeSpace(road, 0.51).labels.max() == 2
 
 
-def test_free_space_is_kept_for_each_road_and_radius():
+def test_free_space_is_cached_per_radius():
     open_road = road_of(np.ones((9, 20), dtype=bool))
     drivable = np.ones((9, 20), dtype=bool)
     drivable[:, 10] = False
@@ -144,24 +144,6 @@ def test_free_space_is_kept_for_each_road_and_radius():
     assert [free_space(road, 0.4).labels.max() for road in (open_road, divided)] == [1, 2]
     assert len(free_cells(free_space(open_road, 2.4), 1)[0]) == 5 * 16
     assert len(free_cells(free_space(open_road, 0.4), 1)[0]) == 9 * 20
-
-
-def test_the_common_component_is_one_that_both_ends_reach():
-    drivable = np.ones((6, 21), dtype=bool)
-    drivable[:, 10] = False
-    road = road_of(drivable)
-    left, right = np.array([2.5, 2.5]), np.array([18.5, 2.5])
-    assert (
-        FreeSpace(road, 0.0).common_component(left, left + 3.0)
-        == FreeSpace(road, 0.0).component_at(left)
-        == 1
-    )
-    assert FreeSpace(road, 0.0).common_component(left, right) is None
-    assert FreeSpace(road, 0.0).common_component(right, right) == 2
-    narrow = road_of(np.ones((1, 9)))  # a lane where no centre has room for the disc
-    assert (
-        FreeSpace(narrow, 0.6).common_component(np.array([1.5, 0.5]), np.array([7.5, 0.5])) is None
-    )
 
 
 @settings(max_examples=60)

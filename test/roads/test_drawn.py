@@ -16,7 +16,7 @@ from scenario_gen.types import Vehicle
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("name", [*BUILT_IN, "paper"])
-def test_a_road_is_its_lanes_and_they_travel_in_messages(name, side):
+def test_road_is_its_lanes_in_messages(name, side):
     config = RoadConfig(lanes=2, traffic_side=side, paper=name == "paper")
     road = build_road("t_intersection" if name == "paper" else name, None, config)
     network = road.lanes
@@ -30,7 +30,7 @@ def test_a_road_is_its_lanes_and_they_travel_in_messages(name, side):
     assert again.drawn and again.arms == network.arms
 
 
-def test_a_road_of_ones_own_has_all_ways_also_where_its_arms_meet_at_a_sharp_angle():
+def test_sharp_planned_road_has_all_ways():
     arms = [Arm.towards(np.pi, 80.0, 2), *(Arm.towards(yaw, 80.0, 1) for yaw in (0.87, -0.87))]
     network = draw_plan(Plan(arms, yielding=(1, 2)), "y", RoadConfig()).lanes
     ways = {
@@ -50,9 +50,7 @@ BICYCLE = Vehicle("b", 1.8, 0.65, "bicycle")
     "name, arms, ways",
     [("straight", 1, 0), ("curve", 1, 0), ("t_intersection", 3, 6), ("four_way", 4, 12)],
 )
-def test_cycle_lanes_lie_beside_the_outermost_lanes_and_lead_through_junctions(
-    name, arms, ways, side
-):
+def test_cycle_lanes_lie_beside_outermost_lanes(name, arms, ways, side):
     config = RoadConfig(lanes=2, cycle_lane=1.8, traffic_side=side)
     road, plain = (
         build_road(name, None, config),
@@ -92,7 +90,7 @@ def test_cycle_lanes_lie_beside_the_outermost_lanes_and_lead_through_junctions(
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_zebra_crossings_reach_from_kerb_to_kerb_before_the_stop_lines(name, side):
+def test_zebra_crossings_precede_stop_lines(name, side):
     config = RoadConfig(crossing="zebra", traffic_side=side, priority="all_way_stop")
     road = build_road(name, None, config)
     walks = road.lanes.others
@@ -115,7 +113,7 @@ def test_zebra_crossings_reach_from_kerb_to_kerb_before_the_stop_lines(name, sid
         assert ((walk.outline - line) @ ahead > 0.0).all()  # who stops does so before it
 
 
-def test_roads_that_have_no_cycle_lanes_refuse_them():
+def test_roads_without_cycle_lanes_refuse_them():
     for name in ("merge", "roundabout"):
         with pytest.raises(
             RefusedError, match=f"road {name} has no cycle lanes; unset road.cycle_lane"
@@ -127,7 +125,7 @@ def test_roads_that_have_no_cycle_lanes_refuse_them():
         RoadConfig(paper=True, crossing="zebra")
 
 
-def test_a_junction_ends_near_its_corners_where_its_arms_are_almost_in_line():
+def test_junction_ends_near_its_corners():
     (encounter,) = read_log(bundled("all_way_stop")).encounters
     network = build_road("four_way", encounter).lanes
     for lane in network.lanes:

@@ -98,7 +98,7 @@ def test_one_that_stands_nowhere_is_refused():
 
 
 @pytest.mark.parametrize("kind", ["straight", "map"])
-def test_rows_of_cars_are_parked_along_the_edges_of_lanes(tmp_path, kind):
+def test_cars_are_parked_along_lane_edges(tmp_path, kind):
     values = {"parked.count": 3, "parked.begin": 4.0, "parked.gap": 0.5, "parked.width": 1.6}
     name = "straight" if kind == "straight" else map_builders.write(tmp_path, ".xml")
     plain = build_road(name)

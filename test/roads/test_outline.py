@@ -13,7 +13,7 @@ from scenario_gen.roads import build_road, RoadConfig
 CROSS = union(box(-30.0, -3.6, 30.0, 3.6), box(-3.6, -20.0, 3.6, 20.0))
 
 
-def test_a_polygon_is_drivable_inside_and_traffic_comes_and_goes_at_its_ends():
+def test_polygon_is_drivable_with_open_ends():
     road = build_road(CROSS)
     assert road.origin.tolist() == [-30.0, -20.0] and road.drivable.shape == (200, 300)
     assert road.drivable.sum() * 0.04 == pytest.approx(CROSS.area)
@@ -25,7 +25,7 @@ def test_a_polygon_is_drivable_inside_and_traffic_comes_and_goes_at_its_ends():
     assert len(road.entries) == len(road.exits) == 4
 
 
-def test_an_array_is_taken_as_it_is():
+def test_array_is_taken_as_it_is():
     cells = np.zeros((40, 300), dtype=bool)
     cells[5:40] = True
     road = build_road(cells, None, RoadConfig(resolution=0.1, obstacles="10 2 0 2 1"))
@@ -53,7 +53,7 @@ def test_what_is_no_road_is_refused(shape, message):
         build_road(shape)
 
 
-def test_what_would_fill_the_memory_is_refused():
+def test_what_fills_the_memory_is_refused():
     with pytest.raises(RefusedError, match=r"road\.max_cells"):
         build_road(box(0.0, 0.0, 1e5, 1e5))
     with pytest.raises(InputError, match="finite"):

@@ -19,9 +19,7 @@ from scenario_gen.roads.ways import draw_ring_route, draw_route
     yaw=st.floats(-3.0, 3.0),
     sharpness=st.floats(0.03, 0.17),
 )
-def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(
-    turn, before, after, yaw, sharpness
-):
+def test_way_joins_lanes_with_continuous_curvature(turn, before, after, yaw, sharpness):
     corner = before * np.array([np.cos(yaw), np.sin(yaw)])
     leave = np.array(
         [*(corner + after * np.array([np.cos(yaw + turn), np.sin(yaw + turn)])), yaw + turn]
@@ -41,7 +39,7 @@ def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(
 @pytest.mark.parametrize(
     ("leave", "turn"), [(0.0, 0.0), (np.pi / 2.0, np.pi / 2.0), (-np.pi / 2.0, -np.pi / 2.0)]
 )
-def test_a_roundabout_is_gone_about_in_the_direction_of_traffic(leave, turn):
+def test_roundabout_follows_direction_of_traffic(leave, turn):
     out = np.array([np.cos(leave), np.sin(leave)])
     goal = np.array([*(70.0 * out + 1.75 * np.array([out[1], -out[0]])), leave])
     way = draw_ring_route(np.array([-70.0, -1.75, 0.0]), goal, np.zeros(2), 20.0)

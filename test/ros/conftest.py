@@ -30,15 +30,12 @@ def start(domain):
     """Start a node as its executable does; what is still running at the end is killed."""
     started = []
 
-    def run(node: str, *more: str, without_tf2: bool = False, **parameters: object) -> Forked:
+    def run(node: str, *more: str, **parameters: object) -> Forked:
         words = [
             *more,
             *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")),
         ]
-        more_environment = {"WITHOUT_TF2": "1"} if without_tf2 else {}
-        process = start_nodes(
-            node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain), **more_environment
-        )
+        process = start_nodes(node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain))
         started.append(process)
         return process
 

@@ -47,9 +47,7 @@ def _repeated(encounter: Encounter, samples: int) -> bytes:
     )
 
 
-def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(
-    tmp_path, domain, client
-):
+def test_bad_tracks_are_named_by_nodes(tmp_path, domain, client):
     (good,) = read_log(RESOURCES / "synthetic_c").encounters
     client.hear("/diagnostics", "/fit", "/report")
     made = Processes(tmp_path, domain, NODES)

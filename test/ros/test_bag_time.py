@@ -20,7 +20,7 @@ def clock(monkeypatch):
     return now
 
 
-def test_the_time_passes_at_its_rate_up_to_the_next_message(clock):
+def test_time_passes_at_its_rate(clock):
     rate = [2.0]
     time = BagTime(lambda: rate[0])
     time.begin(5.0)
@@ -43,7 +43,7 @@ def test_the_time_passes_at_its_rate_up_to_the_next_message(clock):
     assert waited.wait(10.0)
 
 
-def test_lateness_is_caught_up_with_at_any_rate(clock):
+def test_lateness_is_caught_up_with(clock):
     time = BagTime(lambda: 20.0)
     time.begin(0.0)
     time.pause(False)

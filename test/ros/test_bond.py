@@ -81,7 +81,7 @@ def test_heartbeats_from_activation_to_deactivation(bonded):
     assert len({status.instance_id for status in node.sent}) == 1
 
 
-def test_the_bond_ends_when_the_manager_ends_it(bonded):
+def test_bond_ends_with_the_manager(bonded):
     node, bond = bonded
     bond.start()
     node.beat()

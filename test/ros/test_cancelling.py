@@ -3,12 +3,9 @@
 
 """Long work ends where it stands when nobody waits for it any more, and is the same when somebody does."""
 
-import threading
-
 import pytest
 
 from scenario_gen.base.cancelling import cancellable, CancelledError, stop_if_cancelled
-from scenario_gen.base.worker import Worker
 from scenario_gen.logs import read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -21,7 +18,7 @@ from scenario_gen.situation import Situation
 CASE = "scenario_gen/resources/synthetic_c"
 
 
-def test_every_stage_of_a_node_can_be_cancelled(request):
+def test_every_stage_can_be_cancelled(request):
     def read():  # anew: what is derived of an encounter is derived once
         return read_log(request.config.rootpath / CASE).encounters[0]
 
@@ -38,36 +35,3 @@ def test_every_stage_of_a_node_can_be_cancelled(request):
         with cancellable(lambda: True), pytest.raises(CancelledError):
             work()
     stop_if_cancelled()  # outside, nothing is
-
-
-def test_two_threads_run_jobs_of_two_names_at_a_time_and_never_two_of_one():
-    """Of three jobs, two of one name, the second of that name waits though a thread is free."""
-    worker = Worker(lambda *_: None, threads=2)
-    running, most, both = [], [], threading.Event()
-    lock = threading.Lock()
-
-    def job(name, until):
-        def run(cancelled):
-            with lock:
-                running.append(name)
-                most.append(sorted(running))
-            if len(most) == 2:
-                both.set()
-            until(cancelled)
-            with lock:
-                running.remove(name)
-
-        return run
-
-    def patient(cancelled):
-        while not cancelled():
-            both.wait(0.01)
-
-    worker.submit("a", job("a", patient))
-    worker.submit("b", job("b", lambda _: both.wait(180.0)))
-    assert both.wait(180.0) and most[1] == ["a", "b"]
-    ended = threading.Event()
-    worker.submit("a", job("a", lambda _: ended.set()))  # cancels the first, and waits for its end
-    assert ended.wait(180.0)
-    worker.close(180.0)
-    assert all(names.count("a") <= 1 for names in most) and running == []

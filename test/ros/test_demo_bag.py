@@ -15,7 +15,7 @@ from msg_conventions.scenario_info import decode_info
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.ros.common.suite import Job, run_suite
@@ -46,7 +46,7 @@ def forked():
         yield
 
 
-def test_the_suite_records_several_jobs_in_their_namespaces(demo):
+def test_suite_records_jobs_in_namespaces(demo):
     for job in JOBS:
         encounter = read_log(job.log).encounters[0]
         case = generate(encounter, job.road, PipelineConfig(), count=3, seed=7)
@@ -71,7 +71,7 @@ def test_the_suite_records_several_jobs_in_their_namespaces(demo):
     assert [path.name for path in demo.parent.iterdir()] == ["bag"]
 
 
-def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
+def test_played_back_bag_gives_same_bytes(demo, tmp_path, domain, client):
     """Tracks and road of both jobs into fresh nodes that live in the bag's time, each in its namespace."""
     recorded = {}
     for message in read_messages(demo):
@@ -102,22 +102,10 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
         assert made.end() == dict.fromkeys(nodes, 0)
 
 
-@pytest.mark.parametrize(
-    ("log", "error", "said"),
-    [
-        pytest.param(
-            RESOURCES / "synthetic_b",
-            RefusedError,
-            "/x/planner: plan: the recording",
-            marks=pytest.mark.long,
-        ),
-        ("none.csv", InputError, "/x/log_player"),
-    ],
-)
-def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path, log, error, said):
-    with pytest.raises(error, match=said):
+def test_failed_job_names_its_stage(tmp_path):
+    with pytest.raises(InputError, match="/x/log_player"):
         run_suite(
-            [Job("/x", tmp_path / log, "straight")],
+            [Job("/x", tmp_path / "none.csv", "straight")],
             PipelineConfig(),
             count=3,
             seed=7,

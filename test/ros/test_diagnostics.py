@@ -68,7 +68,7 @@ def reporter(domain: int, client: Client) -> Iterator[Reporter]:
     made.close()
 
 
-def test_all_is_said_every_second_stamped_now(reporter: Reporter):
+def test_everything_is_published_each_second(reporter: Reporter):
     from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.qos import QoSPresetProfiles
 
@@ -96,7 +96,7 @@ def test_all_is_said_every_second_stamped_now(reporter: Reporter):
     )
 
 
-def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
+def test_resolved_status_returns_to_ok(reporter: Reporter):
     reported = time.time_ns()
     reporter.diagnostics.failed("tracks", ValueError("no quaternion"))
     reporter.diagnostics.resolve("tracks")
@@ -120,7 +120,7 @@ def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
     reporter.until(lambda: reporter.newest()["plan"].message == "planned", "good news, at once")
 
 
-def test_a_report_takes_the_place_of_the_one_before(reporter: Reporter):
+def test_report_replaces_the_one_before(reporter: Reporter):
     reporter.diagnostics.report(
         *(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 1", " of 2")), stamp_ns=1
     )
@@ -138,7 +138,7 @@ def test_a_report_takes_the_place_of_the_one_before(reporter: Reporter):
     reporter.until(lambda: set(reporter.newest()) == {"state"}, "nothing but the state")
 
 
-def test_of_a_storm_few_messages_are_published_and_what_is_wrong_is_kept(reporter: Reporter):
+def test_status_storm_is_bounded(reporter: Reporter):
     count = len(reporter.heard())
     for k in range(2 * MAX_STATUSES_COUNT):
         reporter.diagnostics.status(Level.ERROR, f"finding {k}", "tracks", {}, log=False)

@@ -44,7 +44,7 @@ def test_no_other_account_reserves_domains(place):
         pass
 
 
-def test_other_middleware_is_kept_on_this_host_by_ros_itself():
+def test_other_middleware_stays_on_host():
     assert this_host_only({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}) == {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"
     }
@@ -53,7 +53,7 @@ def test_other_middleware_is_kept_on_this_host_by_ros_itself():
 
 
 @pytest.mark.dds
-def test_nothing_is_said_beyond_the_loopback_device_nor_through_shared_memory(client):
+def test_traffic_stays_on_loopback(client):
     """As the kernel sees this process, which has a participant in it."""
     process = Path("/proc") / str(os.getpid())
     opened = set()

@@ -4,7 +4,6 @@
 """The first start on a machine: kernels are compiled before there is a node, which is said, and can be ended."""
 
 import os
-import signal
 import subprocess
 import sys
 
@@ -13,24 +12,7 @@ import pytest
 pytestmark = pytest.mark.dds
 
 
-def test_a_node_says_that_kernels_are_compiled_and_ends_when_asked(tmp_path):
-    """With an empty cache."""
-    command = [sys.executable, "-m", "scenario_gen.ros.common.start", "segmenter"]
-    environment = os.environ | {"PYTHONUNBUFFERED": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
-    node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
-    try:
-        said = (line for line in iter(node.stderr.readline, "") if line.startswith("kernels: "))
-        assert next(said, "").endswith("once for this installation\n")
-        node.send_signal(signal.SIGINT)
-        assert (
-            node.wait(timeout=300.0) == 0
-        )  # a kernel that is being compiled is compiled to its end
-    finally:
-        node.kill()
-        node.stderr.close()
-
-
-def test_several_processes_compile_once_and_without_a_folder_each_does(tmp_path):
+def test_several_processes_compile_once(tmp_path):
     """Of a module with one kernel, so that it is short, and one that waits for its first call."""
     (tmp_path / "kernel_of_a_test.py").write_text(
         "from scenario_gen.numerics.kernels import F, kernel\n@kernel(F)\ndef twice(x):\n    return x + x\n"

@@ -14,9 +14,8 @@ import sys
 import sysconfig
 
 import pytest
-from support.suite_processes import Client, ROOT
+from support.suite_processes import ROOT
 
-from msg_conventions.scenario_info import ScenarioEntry
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 from scenario_gen.ros.common.requests import Code
 from scenario_gen.ros.nodes.gp_sampler import GpSampler
@@ -130,14 +129,14 @@ def ask(environment, *goals):
     )
 
 
-def test_the_codes_are_those_of_the_action():
+def test_codes_are_those_of_action():
     text = (ROOT / PACKAGE / "action" / "Generate.action").read_text()
     assert {
         name: int(code) for name, code in re.findall(r"^uint8 ([A-Z_]+)=(\d)", text, re.MULTILINE)
     } == dict(Code.__members__)
 
 
-def test_goals_wait_for_the_inputs_and_one_that_does_not_wait_is_told(environment, suite):
+def test_goals_wait_for_inputs(environment, suite):
     wanted = [{"parameters": {"count": 100 - k, "seed": k, "request": f"r{k}"}} for k in range(3)]
     (first, *others, hasty), heard, _ = ask(
         environment, *wanted, {"wait": 0.0, "then": "log_player"}
@@ -157,9 +156,7 @@ def test_goals_wait_for_the_inputs_and_one_that_does_not_wait_is_told(environmen
     assert "ERROR" not in suite.read_text()
 
 
-def test_what_is_wrong_is_said_with_its_code_and_what_is_at_work_or_waits_is_cancelled(
-    environment, suite
-):
+def test_wrong_goals_get_their_code(environment, suite):
     wrong = [
         {"parameters": values}
         for values in ({"cout": 3}, {"count": 0}, {"request": "1 2"}, {"goals": "1: 9999 0 0 5"})
@@ -199,40 +196,3 @@ def test_what_is_wrong_is_said_with_its_code_and_what_is_at_work_or_waits_is_can
     assert (
         last["code"] == Code.OK and heard["heard"] == sum(one["published"] for one in running) + 3
     )
-
-
-def test_requests_at_the_same_time_give_what_each_gives_alone_by_service_too(environment, suite):
-    """And a small one does not wait for a large one."""
-    goals = [
-        {"parameters": {"count": 8, "seed": k, "ego": ego, "request": f"same{k}"}}
-        for k, ego in ((0, ""), (1, "2"))
-    ]
-    large = (
-        [{"parameters": {"count": 100_000}, "cancel": [1, 0, [1, 2]]}]
-        if GpSampler.THREADS > 1
-        else []
-    )
-    answers, together, order = ask(environment, *large, *goals)
-    assert not large or order[-1] == 0
-    client = Client(int(environment["ROS_DOMAIN_ID"]))
-    try:
-        client.hear("/scenarios/info")
-        told = [client.generate(**goal["parameters"]).reason for goal in goals]
-        assert told == [answer["reason"] for answer in answers[len(large) :]]
-        for goal in goals:
-
-            def published(name=goal["parameters"]["request"]):
-                return [
-                    info.sha256
-                    for info in client.infos()
-                    if info.request == name and isinstance(info, ScenarioEntry)
-                ]
-
-            client.until(
-                lambda published=published: len(published()) == 16, "the scenarios of both"
-            )
-            assert published()[:8] == published()[8:] and set(published()) <= set(
-                together["digests"]
-            )
-    finally:
-        client.close()

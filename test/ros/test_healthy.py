@@ -62,7 +62,7 @@ def test_a_healthy_suite_is_quiet(domain, client, tmp_path):
             process.kill()
 
 
-def test_the_table_of_topics_names_the_publishers():
+def test_topic_table_names_publishers():
     assert publishers_of("/a/tracks") == publishers_of("tracks") == ("log_player", "segmenter")
     assert "planner" in publishers_of("/a/tracks/part")
     assert publishers_of("/a/planner/transition_event") == publishers_of("/tf") == ("*",)

@@ -60,7 +60,7 @@ def test_the_nodes_that_are_started(tmp_path):
     assert [node.executable for node in pictures] == ["static_transform_publisher", "rviz2"]
 
 
-def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given():
+def test_arguments_are_parameters_of_nodes():
     known = {name for node in SUITE for name in flatten(config_of(node_class(node)))}
     assert set(SUITE_FILE.parameters.values()) == known | {"autostart", "use_sim_time"}
     assert set(DRIVE_FILE.parameters.values()) == set(flatten(config_of(node_class("traffic"))))
@@ -81,56 +81,30 @@ def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given()
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "named"),
     [
-        ({"count": "abc"}, "count:=abc: .*whole number"),
-        ({"count": "0"}, "count:=0: .*at least 1"),
-        ({"cout": "3"}, "cout:= is no argument .*did you mean count"),
-        ({"order": "any"}, "order:=any: .*keep, free, swap"),
-        ({"seed": "-1"}, "seed:=-1: .*at least 0"),
-        ({"limits.car.max_speed": "fast"}, "limits.car.max_speed:=fast: .*a number"),
-        ({"segmentation.min_segmnt": "1"}, "did you mean segmentation.min_segment"),
-        (
-            {"without": "planner", "vehicle_type": "van"},
-            "vehicle_type:= has no effect without planner",
-        ),
-        ({"file": "drive.launch.py", "composed": "true"}, "composed:= is no argument"),
-        ({"file": "drive.launch.py", "others": "bogus"}, "others:= is no argument"),
-        ({"without": "planer"}, "without:=planer: choose of .*did you mean planner"),
-        ({"encounter": "[1"}, r"encounter:=\[1"),
-        ({"log": "no_such.csv"}, "log:=no_such.csv: it does not exist"),
-        ({"log": ""}, f"no log is given: write log:=FILE, or log:={LIVE}"),
-        ({"log_level": "loud"}, "log_level:=loud: .*debug, info"),
-        ({"autostart": "2"}, "autostart:=2"),
+        ({"count": "abc"}, "count:=abc"),
+        ({"cout": "3"}, "cout:="),
+        ({"without": "planner", "vehicle_type": "van"}, "vehicle_type:="),
+        ({"file": "drive.launch.py", "composed": "true"}, "composed:="),
+        ({"file": "drive.launch.py", "results": f"{ROOT / 'setup.py'}/x"}, "results:="),
+        ({"log": "no_such.csv"}, "log:=no_such.csv"),
         ({"namespace": "a b"}, "namespace:=a b"),
-        ({"params": "no_such.yaml"}, "no_such.yaml"),
-        ({"bag": "/proc/x"}, "bag:=/proc/x: .*; name another folder"),
-        ({"bag": str(ROOT)}, "File exists; name another folder"),
-        ({"file": "drive.launch.py", "bag": "no_such_bag"}, "bag:=no_such_bag: it does not exist"),
-        (
-            {"file": "drive.launch.py", "results": f"{ROOT / 'setup.py'}/x"},
-            "results:=.*; name another folder",
-        ),
-        ({"params": str(ROOT / "pyproject.toml")}, "no ros__parameters"),
-        ({"starts": "1 2 3"}, "starts:=1 2 3: write `id: x y yaw"),
-        ({"goals": "1: 2 3 0; 2: 4"}, "goals:=.*: write `id: x y yaw"),
-        ({"topics": "(tracks"}, "topics is no regular expression"),
-        ({"topics": "(a+)+b"}, "topics repeats a repetition"),
-        ({"road": "forway"}, "road:=forway: no map .*did you mean four_way"),
-        ({"file": "drive.launch.py", "policy": "brave"}, "policy:=brave: .*reactive"),
+        ({"params": str(ROOT / "pyproject.toml")}, "ros__parameters"),
+        ({"bag": "/proc/x"}, "bag:=/proc/x"),
+        ({"starts": "1 2 3"}, "starts:=1 2 3"),
+        ({"topics": "(a+)+b"}, "topics"),
     ],
     ids=str,
 )
-def test_what_cannot_be_is_refused_before_a_process_starts(given, said):
-    with pytest.raises(InputError, match=said):
+def test_impossible_arguments_are_refused(given, named):
+    with pytest.raises(InputError, match=named):
         launched(**(given if "file" in given else {"log": LOG} | given))
 
 
 @pytest.mark.dds
 @pytest.mark.parametrize("composed", [pytest.param("false", marks=pytest.mark.long), "true"])
-def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(
-    domain, client, tmp_path, composed
-):
+def test_arguments_beat_file_beats_defaults(domain, client, tmp_path, composed):
     """Processes with the arguments that launch_ros gives them; the file has both kinds of sections: ROS takes the last."""
     from lifecycle_msgs.srv import GetState
     from rcl_interfaces.srv import GetParameters
@@ -181,7 +155,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(
         assert [process.wait(180.0) for process in processes] == [0 for _ in processes]
 
 
-def test_a_launch_file_that_includes_ours_may_have_arguments_of_its_own():
+def test_including_launch_file_has_own_arguments():
     texts = {"log": LOG, "robot": "big"}
     line = ["/opt/ros/jazzy/bin/ros2", "launch", "my_robot", "everything.launch.py", "robot:=big"]
     assert parse_arguments(SUITE_FILE, texts, line).parameters == {"log_path": LOG}
@@ -209,41 +183,8 @@ assert others <= {*sys.stdlib_module_names, "scenario_gen", "yaml", "_yaml"}, ot
 """
 
 
-def test_a_launch_imports_nothing_that_ros_python_lacks(tmp_path):
+def test_launch_imports_only_ros_python(tmp_path):
     """Whatever is given: `ros2 launch` runs in ROS's own Python."""
     command = [sys.executable, "-c", IN_ROS_PYTHON, LOG, str(tmp_path / "bag")]
     answer = subprocess.run(command, capture_output=True, text=True, check=True)
     assert json.loads(answer.stdout)["starts"] == "1: 31.8 68.45 0.0 10.7"
-
-
-@pytest.mark.dds
-def test_a_drive_is_launched_with_its_parameters(domain, client):
-    """Each is one of the parameters of `traffic`, and takes effect."""
-    from rcl_interfaces.srv import GetParameters
-
-    (only, *pictures) = launched(
-        "drive.launch.py",
-        ego="002",
-        policy="replay",
-        lock_step="true",
-        namespace="/a",
-        rviz="true",
-    )
-    assert (only.executable, only.namespace, [one.executable for one in pictures]) == (
-        "traffic",
-        "/a",
-        ["rviz2"],
-    )
-    process = start_nodes("traffic", *words(only), ROS_DOMAIN_ID=str(domain))
-    try:
-        request = GetParameters.Request(names=["ego", "drive.policy", "lock_step"])
-        ego, policy, lock_step = client.call(
-            GetParameters, "/a/traffic/get_parameters", request
-        ).values
-        assert (ego.string_value, policy.string_value, lock_step.bool_value) == (
-            "002",
-            "replay",
-            True,
-        )
-    finally:
-        process.kill()

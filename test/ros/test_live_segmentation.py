@@ -33,7 +33,7 @@ def suite(tmp_path_factory, domain):
     assert made.end() == dict.fromkeys(NODES, 0)
 
 
-def test_streams_that_end_are_segmented_and_become_scenarios(suite, client):
+def test_streams_become_scenarios(suite, client):
     """At twelve times the real speed, with the time of /clock."""
     from std_srvs.srv import Trigger
 

@@ -21,7 +21,7 @@ def nodes_of(client):
     }
 
 
-def test_topics_services_and_the_node_are_remapped(start, client):
+def test_topics_and_services_are_remapped(start, client):
     client.hear("/lab/tracks")
     remapped = ("tracks:=/lab/tracks", "~/play:=/lab/again", "__node:=logs", "__ns:=/b")
     start("log_player", *(word for rule in remapped for word in ("-r", rule)), log_path=LOG)
@@ -34,7 +34,7 @@ def test_topics_services_and_the_node_are_remapped(start, client):
     )
 
 
-def test_a_rule_for_one_node_leaves_the_others_of_its_process(start, client):
+def test_rule_for_one_node_spares_others(start, client):
     client.hear("/b/tracks")
     start(
         "suite",
@@ -55,7 +55,7 @@ def test_a_rule_for_one_node_leaves_the_others_of_its_process(start, client):
     )
 
 
-def test_simulated_time_stamps_what_a_node_says(start, client):
+def test_simulated_time_stamps_diagnostics(start, client):
     client.hear("/diagnostics")
     start("road_server", use_sim_time=True, road_name="straight")
     from rosgraph_msgs.msg import Clock
@@ -75,3 +75,23 @@ def test_simulated_time_stamps_what_a_node_says(start, client):
     while not told():
         assert time.monotonic() < deadline
         time.sleep(0.2)
+
+
+def test_qos_of_one_topic_is_overridden(start, client):
+    from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+    overrides = {
+        "qos_overrides./map.publisher.reliability": "best_effort",
+        "qos_overrides./map.publisher.durability": "volatile",
+    }
+    start("road_server", road_name="straight", **overrides)
+    for topic in ("/map", "/road/lanes"):
+        client.until(lambda topic=topic: client.node.count_publishers(topic), topic)
+    offered = {
+        topic: client.node.get_publishers_info_by_topic(topic)[0].qos_profile
+        for topic in ("/map", "/road/lanes")
+    }
+    assert offered["/map"].reliability is ReliabilityPolicy.BEST_EFFORT
+    assert offered["/map"].durability is DurabilityPolicy.VOLATILE
+    assert offered["/road/lanes"].reliability is ReliabilityPolicy.RELIABLE
+    assert offered["/road/lanes"].durability is DurabilityPolicy.TRANSIENT_LOCAL

@@ -64,7 +64,7 @@ def test_a_late_joiner_gets_everything(suite, client):
         late.close()
 
 
-def test_maps_are_served_and_bad_ones_refused(suite, client):
+def test_maps_are_served_or_refused(suite, client):
     from nav_msgs.srv import GetMap, LoadMap
 
     client.hear("/map", "/diagnostics")
@@ -85,7 +85,7 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
     )
 
 
-def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
+def test_plans_are_served_or_refused(suite, client):
     from nav_msgs.srv import GetPlan
 
     client.hear("/diagnostics", "/fit")
@@ -131,7 +131,7 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
         )
 
 
-def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
+def test_ctrl_c_leaves_a_whole_bag(suite):
     codes = suite.end()
     assert codes == dict.fromkeys(CHAIN, 0)
     for node in CHAIN:

@@ -29,7 +29,7 @@ def _message(stamp: int) -> bytes:
     return encode(HEADER, stamp=stamp, frame_id="map")
 
 
-def test_inputs_are_complete_only_with_equal_stamps():
+def test_inputs_need_equal_stamps():
     inputs = Inputs(("tracks", "changepoints"), ("map",))
     assert inputs.missing() == ["changepoints", "map", "tracks"]
     inputs.put("tracks", _message(1))
@@ -49,7 +49,7 @@ def _document(messages: dict[str, bytes]) -> bytes:
     return encode_document(Head(1, hashes))
 
 
-def test_inputs_are_complete_only_if_they_are_those_that_the_documents_name():
+def test_inputs_match_their_documents():
     inputs = Inputs(("tracks", "road/lanes", "fit/info"), ("map",))
     one, other = (encode(HEADER, stamp=1, frame_id=frame) for frame in ("map", "odom"))
     messages = {"tracks": _message(1), "map": one, "road/lanes": _document({"map": one})}
@@ -71,7 +71,7 @@ def test_inputs_are_complete_only_if_they_are_those_that_the_documents_name():
     assert inputs.complete() is not None
 
 
-def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():
+def test_waiting_job_is_replaced():
     done, failures, gate = [], [], threading.Event()
     worker = Worker(lambda name, error: failures.append((name, str(error))))
     started = threading.Event()
@@ -96,7 +96,7 @@ def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():
     worker.close()
 
 
-def test_every_parameter_has_a_descriptor_with_its_range():
+def test_parameters_have_descriptors_with_ranges():
     for name, (entry, _value) in flatten(PipelineConfig()).items():
         made = descriptor(entry)
         assert made.description, name
@@ -106,7 +106,7 @@ def test_every_parameter_has_a_descriptor_with_its_range():
             assert entry.metadata["choices"][0] in made.additional_constraints
 
 
-def test_values_are_checked_and_whole_numbers_are_numbers():
+def test_values_are_checked():
     config = PipelineConfig()
     assert with_values(config, [Parameter("road.lane_width", value=4)]).road.lane_width == 4.0
     with pytest.raises(InputError, match=r"lane_width.*at least"):
@@ -122,7 +122,7 @@ def test_urls_of_load_map():
         road_of_url("http://example.org/map.yaml")
 
 
-def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):
+def test_suite_passes_on_all_parameters(tmp_path):
     body = parameters(
         [Job("/x", tmp_path / "log", "straight", 3)], PipelineConfig(), 5, 7, tmp_path / "bag"
     )

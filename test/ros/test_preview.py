@@ -22,7 +22,7 @@ def states(scenario, at):
     return states_at(scenario, at)
 
 
-def test_states_are_those_of_the_scenario_and_who_is_gone_has_none():
+def test_preview_states_are_the_scenario_s():
     scenario = replace(hand_made_run().generated[0], present=np.array([[0, 60], [20, 40]]))
     here, poses, speeds = states(scenario, 3.0)
     assert (
@@ -33,7 +33,7 @@ def test_states_are_those_of_the_scenario_and_who_is_gone_has_none():
     assert states(scenario, 1.0)[0] == states(scenario, 5.0)[0] == [0]
 
 
-def test_conflicts_are_where_paths_meet_with_who_goes_first():
+def test_conflicts_show_who_goes_first():
     from scenario_gen.ros.nodes.preview import conflicts_of
 
     run = hand_made_run().generated[0]
@@ -53,7 +53,7 @@ def test_conflicts_are_where_paths_meet_with_who_goes_first():
 
 
 @pytest.mark.dds
-def test_every_vehicle_moves_on_tf_and_in_the_markers(start, client):
+def test_vehicles_move_on_tf_and_markers(start, client):
     client.hear("/tf", "preview")
     start("preview")
     run = hand_made_run()

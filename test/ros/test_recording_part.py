@@ -38,7 +38,7 @@ class Node:
         self.statuses.append(message)
 
 
-def test_the_sender_of_a_recording_sends_the_requested_part_of_it_alone() -> None:
+def test_sender_sends_the_requested_part() -> None:
     (whole,) = read_log(LOG).encounters
     limit = whole.duration
 
@@ -61,7 +61,7 @@ def test_the_sender_of_a_recording_sends_the_requested_part_of_it_alone() -> Non
 
 @pytest.mark.dds
 @pytest.mark.long
-def test_nodes_continue_with_the_part_that_fits(tmp_path, domain, client) -> None:
+def test_nodes_continue_with_the_part(tmp_path, domain, client) -> None:
     (whole,) = read_log(LOG).encounters
     road = write(tmp_path, ".xodr", opendrive())
     nodes = {

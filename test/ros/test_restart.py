@@ -23,7 +23,7 @@ NODES = {
 }
 
 
-def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, client):
+def test_killed_nodes_resume(tmp_path, domain, client):
     def processes(name, nodes):
         (tmp_path / name).mkdir()
         return Processes(

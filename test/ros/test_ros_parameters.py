@@ -26,12 +26,12 @@ RESERVED = "start_type_description_service"  # read-only, of every rclpy node
 
 
 @given(strategies.integers(0, 2**63 - 1))
-def test_a_number_is_taken_for_an_id(number):
+def test_number_is_taken_for_an_id(number):
     assert with_values(Config(), [Parameter("ego", value=number)]).ego == str(number)
 
 
 @given(strategies.floats(allow_nan=False, allow_infinity=False))
-def test_a_real_number_is_taken_as_any_tool_writes_it(number):
+def test_real_number_of_any_tool_taken(number):
     entry = DECLARED["limits.time_resolution"]
     assert converted(entry, str(number)) == number
     assert converted(entry, yaml.safe_load(yaml.safe_dump(number))) == number
@@ -48,7 +48,7 @@ def test_a_real_number_is_taken_as_any_tool_writes_it(number):
         ("count", 5.0),
     ],
 )
-def test_what_can_only_be_a_mistake_is_refused(name, value):
+def test_obvious_mistakes_are_refused(name, value):
     with pytest.raises(InputError, match=name.rpartition(".")[2]):
         with_values(Config(), [Parameter(name, value=value)])
 
@@ -64,7 +64,7 @@ def config_names(function: ast.AST) -> set[str]:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_parameter_that_is_read_only_at_the_start_cannot_be_changed_later(name):
+def test_startup_parameters_cannot_be_changed(name):
     """`param set` must not say "successful" and change nothing."""
     node = node_class(name)
     tree = ast.parse(Path(sys.modules[node.__module__].__file__).read_text())
@@ -107,7 +107,7 @@ def loaded(client: Client, node: str, path) -> dict[str, str]:
 
 
 @pytest.mark.dds
-def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
+def test_nodes_load_their_dumped_parameters(domain, client, tmp_path):
     """And each parameter has the type that is declared, whatever was given."""
     values = {
         "ego": "21202",

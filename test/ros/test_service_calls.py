@@ -114,7 +114,7 @@ def differences(answer: Any, wanted: Any, where: str = "") -> list[str]:
     return [] if answer == wanted else [f"{where}: {answer!r} is not {wanted!r}"]
 
 
-def test_every_service_of_the_list_is_called():
+def test_every_listed_service_is_called():
     page = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
     services = page.partition("## Services\n\n")[2].partition("\n\n")[0]
     listed = {
@@ -140,7 +140,7 @@ def suite(tmp_path_factory, domain):
     assert made.end() == dict.fromkeys(NODES, 0)
 
 
-def test_the_calls_are_answered_as_the_example_says(suite, client):
+def test_service_calls_are_answered(suite, client):
     from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.serialization import deserialize_message
 

@@ -121,7 +121,7 @@ process.run_nodes([Stuck], ["stuck"])
 
 
 @pytest.mark.parametrize("place", ["destroy_node", pytest.param("close", marks=pytest.mark.long)])
-def test_a_node_ends_when_something_waits_for_ever_holding_the_lock_of_python(domain, place):
+def test_stuck_node_ends_all_the_same(domain, place):
     """Where it was stuck is said."""
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
     process = subprocess.Popen(
@@ -141,7 +141,7 @@ def test_a_node_ends_when_something_waits_for_ever_holding_the_lock_of_python(do
     assert "Timeout" in output and f"in {place}" in output, output
 
 
-def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
+def test_bad_start_is_one_message(domain, tmp_path):
     (tmp_path / "text.mcap").write_text("no bag")
     for node, arguments, words in (
         ("road_server", ("-p", "road.lane_width:=-1.0"), "lane_width"),

@@ -56,7 +56,7 @@ def spun(node, condition) -> None:
 @pytest.mark.parametrize(
     ("cleaned", "fails"), [(False, False), (True, True)], ids=["deactivate", "cleanup"]
 )
-def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch, cleaned, fails):
+def test_late_work_is_not_published(ros, client: Client, monkeypatch, cleaned, fails):
     """And a node that is active again publishes what is done then."""
     from scenario_gen.ros.nodes import segmenter
 
@@ -102,9 +102,7 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
         node.destroy_node()
 
 
-def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
-    ros, client: Client
-):
+def test_evaluator_gives_up_lost_requests(ros, client: Client):
     from scenario_gen.ros.nodes.evaluator import Evaluator
 
     node = Evaluator()
@@ -133,7 +131,7 @@ def _said(client: Client) -> str:
     return "\n".join(s.message for s in client.statuses())
 
 
-def test_of_too_many_jobs_the_newest_is_answered_at_once():
+def test_newest_of_many_jobs_is_answered():
     failures: list[BaseException] = []
     worker = Worker(lambda _, error: failures.append(error))
     started, gate, answers = threading.Event(), threading.Event(), []

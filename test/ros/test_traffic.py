@@ -6,7 +6,6 @@
 from dataclasses import replace
 import json
 import math
-import os
 from pathlib import Path
 import subprocess
 import sys
@@ -30,7 +29,6 @@ from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
-from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.common import planner_trials
 from scenario_gen.ros.common.driving import decode_command, FIRST_STAMP_NS
@@ -92,9 +90,7 @@ class Slow:
         return of_twist(seen.ego, 3.0, 0.0, self.step)
 
 
-def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(
-    traffic, client, tmp_path
-):
+def test_lock_step_verdict_equals_in_process(traffic, client, tmp_path):
     from std_srvs.srv import Trigger
 
     traffic(results=tmp_path / "results")
@@ -136,7 +132,7 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(
     assert not grid.drivable.all() and grid.drivable.any()
 
 
-def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
+def test_ego_faults_are_reported(traffic, client):
     from rcl_interfaces.srv import SetParameters
     from rclpy.parameter import Parameter
 
@@ -196,7 +192,7 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     ("stamp", "step"),
     [(0, 7), (FIRST_STAMP_NS, 0), (FIRST_STAMP_NS + 300_000_000, 3), (10**18, 7)],
 )
-def test_a_stamp_of_the_drive_names_the_state_that_a_command_answers(stamp, step):
+def test_stamp_names_the_answered_state(stamp, step):
     run = hand_made_run()
     loop = ClosedLoop(run.generated.scenarios[0], 0, run.road, ClosedLoopConfig())
     data = encode(
@@ -205,7 +201,7 @@ def test_a_stamp_of_the_drive_names_the_state_that_a_command_answers(stamp, step
     assert decode_command("ego/cmd_vel_stamped", data, loop, "vehicle_1", 7).step == step
 
 
-def test_two_egos_and_a_late_one_are_said(traffic, client):
+def test_two_egos_and_late_commands(traffic, client):
     """A second node that commands, and commands whose stamp is old: the drive goes on, and the verdict says both."""
     import rclpy
 
@@ -259,7 +255,7 @@ def sampler(domain):
     made.close()
 
 
-def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client, sampler):
+def test_live_scenarios_use_their_road(start, client, sampler):
     """What gp_sampler publishes, in any order; neither requests from before the start nor cancelled ones."""
     from std_srvs.srv import Trigger
 
@@ -354,9 +350,7 @@ rclpy.spin(node)
 """
 
 
-def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
-    bag, tmp_path, monkeypatch
-):
+def test_planner_node_verdicts_equal_in_process(bag, tmp_path, monkeypatch):
     """`scenario-gen drive --ros`: any node that answers its odometry with a command; what it is not is said."""
     from typer.testing import CliRunner
 
@@ -404,7 +398,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
         assert said in str(refused.exception), refused.output
 
 
-def test_a_planner_that_calls_step_itself_does_not_stop_the_command(bag, tmp_path):
+def test_planner_may_call_step_itself(bag, tmp_path):
     """Both the command and the planner's call of traffic/step wait for one reply."""
     example = Path(__file__).parents[2] / "examples" / "ego_consumer.py"
     planner = f"{sys.executable} {example} --ros-args -p lock_step:=true"
@@ -412,21 +406,3 @@ def test_a_planner_that_calls_step_itself_does_not_stop_the_command(bag, tmp_pat
     command += ["--planner", planner, "--out", str(tmp_path / "out"), "--ego", "1"]
     ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=180.0)
     assert (tmp_path / "out" / "drives.json").is_file(), ended.stdout + ended.stderr
-
-
-def test_the_example_drives_a_whole_bag_in_lock_step(start, client, bag, domain, tmp_path):
-    """Scenarios follow on by themselves; the end is said once, with how many drives passed."""
-    count = len(read_trials(bag))
-    assert count > 1
-    traffic = start("traffic", bag=bag, lock_step=True, results=tmp_path / "results")
-    client.hear("verdicts")
-    client.until(lambda: client.node.count_publishers("verdicts") >= 1, "verdicts")
-    example = Path(__file__).resolve().parents[2] / "examples" / "ego_consumer.py"
-    command = [sys.executable, str(example), "--ros-args", "-p", "lock_step:=true"]
-    with subprocess.Popen(command, env=os.environ | {"ROS_DOMAIN_ID": str(domain)}) as planner:
-        try:
-            client.wait("verdicts", count)
-        finally:
-            planner.terminate()
-    document = json.loads((tmp_path / "results" / "drives.json").read_text())
-    assert len(document["drives"]) == count and traffic.poll() is None

@@ -3,14 +3,11 @@
 
 """Two nodes that publish the same topics in one namespace: each of them says so, and names the other."""
 
-from types import SimpleNamespace
-
 import pytest
 from support.bag_examples import hand_made_run
 
 from msg_conventions.diagnostics import Level
 from scenario_gen.bags.recordings.write import result_messages
-from scenario_gen.ros.common.topics import conflicting_publishers
 
 pytestmark = pytest.mark.dds
 
@@ -25,7 +22,7 @@ def twins_of(client):
     return found
 
 
-def test_two_road_servers_in_one_namespace_name_each_other(start, client):
+def test_twin_road_servers_name_each_other(start, client):
     client.hear("/diagnostics")
     start("road_server", "-r", "__node:=one", road_name="straight")
     second = start("road_server", "-r", "__node:=two", road_name="straight")
@@ -45,7 +42,7 @@ def test_two_road_servers_in_one_namespace_name_each_other(start, client):
     )
 
 
-def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_path):
+def test_recorder_blames_two_publishers(start, client, tmp_path):
     """Messages of one request, of which a second node of the same topics makes others."""
     start("recorder", bag=tmp_path / "bag")
     client.hear("/diagnostics")
@@ -74,18 +71,3 @@ def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_
 
     client.until(blamed, "the recorder to blame the publishers")
     assert "disk" not in blamed()[-1]
-
-
-def test_a_publisher_whose_node_is_not_known_yet_is_no_twin():
-    """Discovery has its name a moment later."""
-    names = ["me", "two", "_NODE_NAME_UNKNOWN_"]
-    infos = [SimpleNamespace(node_namespace="/", node_name=name) for name in names]
-    node = SimpleNamespace(
-        publishers=[SimpleNamespace(topic_name="/map")],
-        get_name=lambda: "me",
-        get_fully_qualified_name=lambda: "/me",
-        get_publishers_info_by_topic=lambda _: infos,
-    )
-    assert conflicting_publishers(node) == {"/map": ["/two"]}
-    del infos[1]
-    assert conflicting_publishers(node) == {}

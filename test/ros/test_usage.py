@@ -10,7 +10,7 @@ import pytest
 from support.node_server import start_nodes
 
 from scenario_gen.ros.common.ros_parameters import help_of
-from scenario_gen.ros.common.start import node_class
+from scenario_gen.ros.common.start import chosen_nodes, node_class
 from scenario_gen.ros.node_names import COMPOSABLE
 
 
@@ -29,7 +29,7 @@ from scenario_gen.ros.node_names import COMPOSABLE
     ],
     ids=str,
 )
-def test_what_ros_cannot_read_is_one_line(words, said):
+def test_unreadable_arguments_give_one_line(words, said):
     process = start_nodes("suite" if "-r" in words else "player", "--ros-args", *words)
     output, _ = process.communicate(180.0)
     (line,) = output.splitlines()
@@ -42,8 +42,19 @@ def test_what_ros_cannot_read_is_one_line(words, said):
 
 
 @pytest.mark.parametrize("name", COMPOSABLE)
-def test_every_node_lists_all_of_its_parameters(name):
+def test_nodes_list_all_parameters(name):
     module = importlib.import_module(f"scenario_gen.ros.nodes.{name}")
     text = help_of(name, (node_class(name),))
     for entry in fields(module.Config):
         assert f"  {entry.name} := " in text or f"  {entry.name}." in text
+
+
+def test_nodes_are_chosen_by_name():
+    assert chosen_nodes(["suite", "--nodes", "segmenter,recorder", "--ros-args"]) == (
+        ["recorder", "segmenter"],
+        ["suite", "--ros-args"],
+    )
+    assert "player" not in chosen_nodes(["suite"])[0]
+    for words in (["--nodes", "no_such"], ["--nodes"]):
+        with pytest.raises(SystemExit, match="usage"):
+            chosen_nodes(["suite", *words])

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import shapely
 
-from scenario_gen.logs import bundled, read_log
 from scenario_gen.situation import find_conflicts, find_waits, Wait
 from scenario_gen.types import Encounter, Motion, Vehicle
 
@@ -45,7 +44,7 @@ def box(length, width, x, y, yaw):
     return shapely.Polygon(corners @ rotation.T + (x, y))
 
 
-def test_a_crossing_is_ordered_by_first_entry():
+def test_crossing_is_ordered_by_first_entry():
     (found,) = conflicts(straight(-30, 0, 0, 5), straight(0, -20, np.pi / 2, 5))
     assert (found.first, found.second, found.following) == (1, 0, False)
     # b's front (2.4 m ahead) reaches a's sweep (|y| <= 0.95) after 20 - 2.4 - 0.95 = 16.65 m, its rear leaves it 6.7 m later
@@ -54,7 +53,7 @@ def test_a_crossing_is_ordered_by_first_entry():
     assert found.entry_second == pytest.approx((30 - 2.4 - 0.95) / 5, abs=1e-3)
 
 
-def test_parallel_lanes_are_no_conflict_and_a_slight_touch_is_one():
+def test_parallel_lanes_are_no_conflict():
     assert conflicts(straight(0, 0, 0, 10), straight(100, 2.0, np.pi, 10)) == ()
     (found,) = conflicts(straight(0, 0, 0, 10), straight(110, 1.8, np.pi, 10))
     # both sweeps share a strip; a enters it where b's journey ends, b where a's ends
@@ -88,7 +87,7 @@ def test_following_is_ordered_along_the_route(leader, ahead, speed, beside, entr
     assert entry is None or found.entry_second == pytest.approx(entry / 10, abs=1e-3)
 
 
-def test_a_vehicle_that_stands_in_the_way_is_first():
+def test_standing_vehicle_in_way_is_first():
     (found,) = conflicts(straight(0, 0, 0, 10), straight(50, 1.0, 0, 0))
     assert (found.first, found.following, found.entry_first, found.exit_first) == (
         1,
@@ -98,12 +97,12 @@ def test_a_vehicle_that_stands_in_the_way_is_first():
     )
 
 
-def test_entering_at_the_same_instant_is_ordered_by_index():
+def test_simultaneous_entry_is_ordered_by_index():
     (found,) = conflicts(straight(-20, 0, 0, 5), straight(0, -20, np.pi / 2, 5))
     assert (found.first, found.second) == (0, 1)
 
 
-def test_merging_is_ordered_by_who_merges_first():
+def test_merging_is_ordered_by_merge():
     x = np.linspace(0, 100, TIME.size)
     merge = np.stack([x + 5, 3.5 * (1 - 1 / (1 + np.exp(-(x - 40) / 5)))], -1)
     heading = np.arctan2(np.gradient(merge[:, 1]), np.gradient(merge[:, 0]))
@@ -111,7 +110,7 @@ def test_merging_is_ordered_by_who_merges_first():
     assert (found.first, found.following) == (1, True)
 
 
-def test_a_fast_crossing_between_two_samples_is_seen():
+def test_fast_crossing_between_samples_is_seen():
     time = np.arange(11) * 1.0  # 40 m between samples
     (found,) = conflicts(
         straight(-100, 0, 0, 40, time), straight(20, -210, np.pi / 2, 40, time), time=time
@@ -128,7 +127,7 @@ def speeds(first, second, *changes):
     return encounter(speed)
 
 
-def test_waits_are_slow_for_at_least_a_second_and_not_ended_by_one_noisy_sample():
+def test_waits_are_slow_for_a_second():
     found = find_waits(
         speeds(5.0, 0.2, (0, 20, 40, 0.0), (0, 60, 66, 0.0))
     )  # the second time for half a second
@@ -142,7 +141,7 @@ def test_waits_are_slow_for_at_least_a_second_and_not_ended_by_one_noisy_sample(
     )
 
 
-def test_who_does_not_stand_for_a_second_moves_slowly():
+def test_short_stand_is_slow_motion():
     made = speeds(
         5.0, 5.0, (0, 20, 60, 0.3), (0, 30, 39, 0.0), (1, 20, 60, 0.3), (1, 30, 41, 0.05)
     )
@@ -174,7 +173,7 @@ def test_existence_and_entry_agree_with_shapely(seed):
     tracks = []
     for _ in range(2):
         yaw = rng.uniform(-np.pi, np.pi) + np.cumsum(np.full(time.size, rng.uniform(-0.05, 0.05)))
-        # slower than 2 cm a sample, samples are left out of the sweep; `test_a_vehicle_that_stands_in_the_way_is_first`
+        # slower than 2 cm a sample, samples are left out of the sweep; `test_standing_vehicle_in_way_is_first`
         step = np.stack([np.cos(yaw), np.sin(yaw)], -1) * max(rng.uniform(0, 1.5), 0.02)
         tracks.append((rng.uniform(-15, 15, 2) + np.cumsum(step, 0), yaw))
     found = conflicts(*tracks, vehicles=vehicles, time=time)
@@ -207,13 +206,7 @@ def test_existence_and_entry_agree_with_shapely(seed):
     assert one.following or one.entry_first <= one.entry_second
 
 
-def test_recorded_left_turner_yields_to_the_oncoming_car():
-    (log,) = read_log(bundled("ngsim_left_turn")).encounters
-    (found,) = find_conflicts(log)
-    assert found.exit_first < found.entry_second
-
-
-def test_who_is_there_only_for_a_time_enters_then():
+def test_late_presence_enters_late():
     """Vehicle b stands in a's way from its arrival on; before it arrives it is in nobody's way."""
     tracks = straight(-30, 0, 0, 5), straight(-10, 0, 0, 0)
     position, heading = (np.array(a) for a in zip(*tracks, strict=True))
@@ -225,7 +218,7 @@ def test_who_is_there_only_for_a_time_enters_then():
     assert (found.first, found.entry_first) == (1, 0.0)
 
 
-def test_a_vehicle_waits_only_while_it_is_there():
+def test_vehicle_waits_only_while_present():
     (wait,) = find_waits(replace(speeds(5.0, 0.2), present=np.array([[0, 100], [30, 80]])))
     assert (wait.vehicle, wait.start, wait.end) == (1, 3.0, 8.0)
 
@@ -245,7 +238,7 @@ def test_who_walks_slowly_does_not_wait():
 
 
 @pytest.mark.parametrize(("dt", "late"), [(0.1, 0.2), (0.05, 0.2), (0.02, 0.18)])
-def test_a_wait_is_that_of_the_mean_speed_over_half_a_second(dt, late):
+def test_wait_uses_the_mean_speed(dt, late):
     """From 4 m/s at once to a stand from 2 s to 6 s: the mean falls below 0.5 m/s when an eighth moves."""
     time = np.arange(round(10.0 / dt) + 1) * dt
     speed = np.where((time > 2.0 - 1e-9) & (time < 6.0 + 1e-9), 0.0, 4.0)[None]

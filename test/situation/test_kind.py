@@ -35,7 +35,7 @@ EXPECTED = {
 
 
 @pytest.mark.parametrize("name", EXPECTED)
-def test_textbook_motions_have_the_kind_that_anybody_would_name(name):
+def test_textbook_motions_have_their_kind(name):
     kinds = [kind_of(labelled(name, seed).encounter, 0, 1) for seed in range(20)]
     assert kinds.count(EXPECTED[name]) >= 19
 
@@ -51,7 +51,7 @@ def test_textbook_motions_have_the_kind_that_anybody_would_name(name):
         ]
     ),
 )
-def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case):
+def test_kind_ignores_direction_and_order(turned, case):
     kind, *starts = case
     time = np.arange(0.0, 12.0, 0.1)
     x, y, heading = np.array(starts).T[..., None]

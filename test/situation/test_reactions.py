@@ -23,7 +23,7 @@ TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))
 
 
 @pytest.mark.parametrize("lag", [0.6, 1.2, 2.0])
-def test_a_planted_lag_and_gain_are_found(lag):
+def test_planted_lag_and_gain_are_found(lag):
     found = []
     for seed in range(6):
         leader = wander(np.random.default_rng(seed), 400)
@@ -47,7 +47,7 @@ def test_independent_drives_hardly_ever_react():
 
 
 @pytest.mark.parametrize("lag", [0.3, 1.5, 2.5])
-def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
+def test_waiting_vehicle_yields(lag):
     clears = Situation.of(crossing(8.0)).reactions.edges[0].clears
     graph = Situation.of(crossing(clears + lag)).reactions
     (edge,) = graph.edges
@@ -57,14 +57,14 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
 
 
 @pytest.mark.parametrize("speed", [2.0, 3.9, 4.4, 6.0])
-def test_a_follower_is_less_surely_one_the_longer_its_time_gap(speed):
+def test_confidence_falls_with_the_time_gap(speed):
     """0.9 at 2 s, 0.5 at 4 s and in between on a line; who is slower than 4 m/s counts as so fast."""
     steady, bumper = np.full(150, speed), 20.0 - 4.8
     (edge,) = Situation.of(lane_encounter(steady, steady, 20.0)).reactions.edges
     assert edge.confidence == pytest.approx(0.9 - 0.2 * (bumper / max(speed, 4.0) - 2.0))
 
 
-def test_who_leaves_long_after_waits_for_something_else():
+def test_late_departure_is_no_reaction():
     graph = Situation.of(crossing(14.0)).reactions
     assert graph.edges == ()
     assert graph.sentences(TWO)[0].startswith(
@@ -96,7 +96,7 @@ def pairs_of(encounter):
     return {(one.who, one.whom): one for one in edges}.values()
 
 
-def test_textbook_motions_are_seen_and_no_others():
+def test_only_textbook_reactions_are_seen():
     edges, there = seen([kind for kind in (*REACTIONS, *NOTHING) if kind not in CHANCE])
     right = int(edges[:, 1].sum())
     assert right / len(edges) >= 0.95 and right / there >= 0.95
@@ -108,19 +108,11 @@ def test_every_kind_of_reaction_is_seen(kind):
     assert edges[:, 1].sum() >= 0.85 * there == 17.0
 
 
-def test_confidence_is_how_often_an_edge_is_right():
+def test_confidence_is_the_share_of_right():
     edges, _ = seen((*REACTIONS, *NOTHING))
     for low, high in ((0.5, 0.85), (0.85, 0.95), (0.95, 1.0)):
         band = edges[(edges[:, 0] >= low) & (edges[:, 0] < high)]
         assert band[:, 1].mean() == pytest.approx(band[:, 0].mean(), abs=0.12)
-
-
-def test_why_none_is_seen_is_said():
-    apart = Situation.of(labelled("crossing, long after", 0).encounter).reactions
-    assert "never within" in apart.why and apart.sentences(TWO)[0].endswith(apart.why)
-    assert (
-        "none drives behind another" in Situation.of(labelled("beside", 1).encounter).reactions.why
-    )
 
 
 def test_who_overtakes_does_not_follow():
@@ -135,7 +127,7 @@ def edge(who, whom, confidence):
     return Reaction(FOLLOW, who, whom, 1.0, 1.0, 1.0, confidence, 0.0, 10.0, (1.0, 1.0, 1.0))
 
 
-def test_the_least_sure_edge_of_a_circle_is_cut_and_said():
+def test_least_sure_edge_is_cut():
     graph = without_circles([edge(0, 1, 0.9), edge(1, 2, 0.4), edge(2, 0, 0.8)], 3)
     assert [(one.who, one.whom) for one in graph.cut] == [(1, 2)]
     assert graph.order == (1, 0, 2)
@@ -143,7 +135,7 @@ def test_the_least_sure_edge_of_a_circle_is_cut_and_said():
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
-def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
+def test_order_follows_reactions(count):
     pairs = list(itertools.permutations(range(count), 2))
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -152,16 +144,6 @@ def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
         assert sorted(graph.order) == list(range(count))
         assert len(graph.edges) + len(graph.cut) == len(edges)
         assert all(graph.order.index(one.whom) < graph.order.index(one.who) for one in graph.edges)
-
-
-def test_a_doubtful_edge_is_said_to_be():
-    assert edge(0, 1, 0.4).words(AB).endswith("(doubtful)")
-    assert "doubtful" not in edge(0, 1, 0.6).words(AB)
-    assert (
-        edge(0, 1, 0.6)
-        .document(AB)["words"]
-        .startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")
-    )
 
 
 def figures(encounter):
@@ -203,20 +185,12 @@ def test_nothing_depends_on_the_frame(kind):
         assert after == pytest.approx(before, abs=1e-6)
 
 
-def test_a_conflict_is_found_by_its_pair_in_either_order():
-    situation = Situation.of(crossing(8.0))
-    (found,) = situation.conflicts
-    assert situation.conflict(0, 1) is found and situation.conflict(1, 0) is found
-
-
 @pytest.mark.parametrize("frame", [0.0, 2.2])
 @pytest.mark.parametrize(
     ("left", "turned", "beside"),
     [(1.0, 0.0, False), (2.3, 0.0, True), (1.0, 0.6, True), (1.0, -0.6, True), (0.0, 0.4, False)],
 )
-def test_who_enters_at_an_angle_or_from_the_next_lane_comes_from_beside(
-    frame, left, turned, beside
-):
+def test_angled_entry_comes_from_beside(frame, left, turned, beside):
     """Within half a lane and half a radian it is behind; 10 m after the other one's start."""
     along = np.array([[np.cos(frame), np.sin(frame)], [-np.sin(frame), np.cos(frame)]])
     time = np.arange(101) * 0.1

@@ -23,19 +23,19 @@ def queue(*places, present=ALWAYS):
     return Encounter.sampled(vehicles, 0.1, position, flat, flat + 5.0, "queue", present=present)
 
 
-def test_the_least_gap_of_each_is_to_its_nearest():
+def test_least_gap_is_to_nearest():
     encounter = queue(0.0, 4.4, 10.0, 30.0)
     assert least_gaps(encounter) == pytest.approx([0.4, 0.4, 1.6, 16.0])
     assert Situation.of(encounter).least_gap == pytest.approx(0.4)
 
 
-def test_gaps_of_two_that_never_meet_and_of_two_in_one_place():
+def test_gaps_of_apart_and_coincident():
     assert Situation.of(queue(0.0, 5.0, present=np.array([[0, 9], [20, 29]]))).least_gap == np.inf
     assert (least_gaps(queue(0.0, 1.0)) < 0.0).all()
 
 
 @pytest.mark.parametrize(("meet", "begin"), [(6.25, 3.25), (0.5, 0.0), (9.5, 5.0)])
-def test_vehicles_without_events_are_needed_when_they_are_nearest(meet, begin):
+def test_nearest_instants_are_needed(meet, begin):
     """For 5 s about the instant at which two pass each other that react to nothing, or from an end on."""
     time = np.arange(101) * 0.1
     along = np.column_stack([8.0 * time, np.zeros(101)])

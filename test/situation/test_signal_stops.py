@@ -23,6 +23,6 @@ def test_queue_stops_for_the_light(lag, queue):
     assert "vehicle 2 stops at red, leaves" in graph.sentences(encounter.vehicles)[queue - 1]
 
 
-def test_without_states_nothing_is_said_of_lights():
+def test_no_lights_without_states():
     (encounter,) = read_log(signalised(lights=False)).encounters
     assert encounter.lights == () and Situation.of(encounter).reactions.stops == ()

@@ -74,7 +74,7 @@ def test_crossings_are_found_at_their_stations():
     assert len(crossings(one, Curve(one.points + np.array([0.0, 1.0, 0.0])))) == 0
 
 
-def test_noise_is_smoothed_and_a_standing_vehicle_is_a_point():
+def test_noise_is_smoothed():
     rng = np.random.Generator(np.random.PCG64(3))
     clean = arc(0.0, 0.0, 0.3, 30.0, 8.0)
     noisy = clean.copy()
@@ -90,7 +90,7 @@ def test_noise_is_smoothed_and_a_standing_vehicle_is_a_point():
     assert standing.poses[0].tolist() == pytest.approx([20.0, -9.0, 1.0])
 
 
-def test_a_junction_turn_is_one_and_a_bend_is_not():
+def test_junction_turn_differs_from_bend():
     turner, bender = clean_tracks(
         encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), arc(0.0, 50.0, 0.0, -80.0, 8.0))
     )
@@ -106,7 +106,7 @@ def test_a_junction_turn_is_one_and_a_bend_is_not():
     assert round_.makes_u_turn
 
 
-def test_gaps_survive_when_a_winding_road_is_laid_out_straight():
+def test_gaps_survive_straightening():
     lead, follow = arc(0.0, 0.0, 0.0, 90.0, 12.0, 400), arc(0.0, 0.0, 0.0, 90.0, 12.0, 400)
     encounter = encounter_of(lead[50:350], follow[:300])  # 5 s, 60 m behind
     frenet = to_frenet(clean_tracks(encounter))
@@ -117,7 +117,7 @@ def test_gaps_survive_when_a_winding_road_is_laid_out_straight():
     assert high == pytest.approx(frenet.station[0, -1] + 2.4)
 
 
-def test_lanes_and_changes_of_lane_are_told_from_offsets():
+def test_lanes_are_told_from_offsets():
     t = 200
     changing = line(0.0, 3.6, 0.0, 10.0, t)
     x = np.clip((np.arange(t) - 60) / 60.0, 0.0, 1.0)
@@ -136,7 +136,7 @@ def test_lanes_and_changes_of_lane_are_told_from_offsets():
     ("apart", "between"),
     [(3.5, (0, 0)), (7.0, (1, 0)), (12.0, (1, 1)), (14.0, (2, 1)), (25.0, (2, 2)), (-4.0, (0, 0))],
 )
-def test_oncoming_vehicles_that_are_far_apart_have_lanes_between_them(apart, between):
+def test_distant_oncoming_have_lanes_between(apart, between):
     encounter = encounter_of(line(0.0, 0.0, 0.0, 10.0), line(120.0, apart, np.pi, 9.0))
     frenet = to_frenet(clean_tracks(encounter))
     assert frenet.between == between
@@ -146,14 +146,14 @@ def test_oncoming_vehicles_that_are_far_apart_have_lanes_between_them(apart, bet
     assert spread.lanes == max(between) + 1
 
 
-def test_a_line_continued_by_one_far_beside_it_does_not_jump():
+def test_distant_continuation_makes_no_jump():
     encounter = encounter_of(line(0.0, 0.0, 0.0, 7.0), line(125.0, 18.0, np.pi, 6.0))
     frenet = to_frenet(clean_tracks(encounter))
     assert np.ptp(frenet.line.points[:, 1]) < 1.0
     assert abs(abs(frenet.offset[1] - frenet.offset[0]).mean() - 18.0) < 0.5
 
 
-def test_turns_and_crossings_are_not_along_a_road():
+def test_turns_are_not_along_a_road():
     with pytest.raises(RefusedError, match="vehicle 0 turns left"):
         to_frenet(
             clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), line(0.0, 30.0, 0.0, 5.0)))
@@ -166,7 +166,7 @@ def test_turns_and_crossings_are_not_along_a_road():
         )
 
 
-def test_overlapping_vehicles_are_pulled_apart_by_the_least():
+def test_overlapping_vehicles_are_pulled_apart():
     tracks = clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(0.5, 1.5, 0.0, 8.0)))
     assert smallest_gaps(tracks)[0, 1] == pytest.approx(-0.4, abs=0.01)
     separation = separate(tracks, 0.5, 3.0)
@@ -177,7 +177,7 @@ def test_overlapping_vehicles_are_pulled_apart_by_the_least():
         separate(tracks, 0.5, 0.3)
 
 
-def test_a_bend_no_car_can_steer_is_eased_and_turns_as_far():
+def test_tight_bend_is_eased():
     t = 60
     tight = np.vstack((line(0.0, 0.0, 0.0, 5.0, t), arc(29.5, 0.0, 0.0, 3.5, 2.0, 56)))
     last = tight[-1]
@@ -192,7 +192,7 @@ def test_a_bend_no_car_can_steer_is_eased_and_turns_as_far():
 
 @pytest.mark.parametrize("beyond", [0.9, 6.0])
 @pytest.mark.parametrize("aside", [0.0, 1.5])
-def test_a_line_goes_on_along_what_leads_a_metre_beyond_its_ends(beyond, aside):
+def test_line_is_extended_beyond_its_ends(beyond, aside):
     own = Curve(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]))
     x = np.linspace(-beyond, 50.0 + beyond, 200)
     found = _extended(own, Curve.through(np.column_stack([x, np.full(200, aside)])))
@@ -203,7 +203,7 @@ def test_a_line_goes_on_along_what_leads_a_metre_beyond_its_ends(beyond, aside):
         assert np.abs(found.points[:, 1]).max() < 0.01
 
 
-def test_placements_are_the_weighted_least_squares_of_their_equations():
+def test_placements_are_weighted_least_squares():
     """A chain without contradiction, and one of two places with weights of 1 and 2: 4 m of 5 m."""
     chain = [
         Equation(((7, 1.0),), 2.0, 1.0),
@@ -234,7 +234,7 @@ def test_paths_cross_where_lines_do(yaw, speed, driven):
 
 
 @pytest.mark.parametrize(("speed", "turned", "along"), [(5.0, 1, 12.68), (7.2, 5, 47.32)])
-def test_of_two_crossings_the_one_closer_in_time_counts(speed, turned, along):
+def test_crossing_closer_in_time_counts(speed, turned, along):
     """A circle of 20 m is crossed after 30° and after 150°, at 1.3 s and at 6.5 s."""
     circle, north = arc(0.0, -20.0, 0.0, 20.0, 8.0), line(10.0, -30.0, np.pi / 2.0, speed)
     found = path_crossing(*clean_tracks(encounter_of(circle, north)))
@@ -246,7 +246,7 @@ def test_of_two_crossings_the_one_closer_in_time_counts(speed, turned, along):
     ("beside", "width", "count"),
     [(1.6, 0.6, 1), (-2.9, 0.6, 1), (1.6, 1.9, 0), (0.9, 0.6, 0), (3.1, 0.6, 0)],
 )
-def test_a_bicycle_beside_a_car_shares_its_lane(beside, width, count):
+def test_bicycle_beside_car_shares_its_lane(beside, width, count):
     encounter = encounter_of(line(0.0, 0.0, 0.0, 5.0), line(10.0, beside, 0.0, 5.0))
     pair = (Vehicle("c", 4.5, 1.9), Vehicle("b", 1.8, width))
     found = abreast_in_lane(clean_tracks(replace(encounter, vehicles=pair)))

@@ -31,7 +31,7 @@ def oncoming(side):
 
 
 @pytest.mark.parametrize(("side", "name"), [(1.0, "right"), (-1.0, "left")])
-def test_the_side_is_that_on_which_oncoming_vehicles_pass(side, name):
+def test_side_is_that_of_passing(side, name):
     assert traffic_side(oncoming(side)) == name
     assert traffic_side(mirrored(oncoming(side))) == {"right": "left", "left": "right"}[name]
 
@@ -40,12 +40,3 @@ def test_who_passes_nobody_has_no_side():
     one = oncoming(1.0)
     position = one.position[[0, 0]] + np.array([[[0.0, 0.0]], [[20.0, 0.0]]])
     assert traffic_side(replace(one, position=position, heading=one.heading[[0, 0]])) == ""
-
-
-def test_a_mirror_image_of_a_mirror_image_is_the_template():
-    one = oncoming(1.0)
-    twice = mirrored(mirrored(one))
-    assert np.array_equal(twice.position, one.position) and np.allclose(
-        np.cos(twice.heading), np.cos(one.heading)
-    )
-    assert mirrored(one).name == "o" and np.array_equal(mirrored(one).speed, one.speed)

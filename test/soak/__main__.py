@@ -29,7 +29,6 @@ PARTS = (
     "oracle",
     "properties",
     "recorded",
-    "ros",
     "tests",
 )
 OUT = Path("out/soak")

@@ -23,7 +23,7 @@ def encounter(**changes):
     return Encounter(**(arguments | changes))
 
 
-def test_arrays_cannot_be_changed_behind_our_back():
+def test_arrays_cannot_be_changed():
     position = np.zeros((2, 5, 2))
     made = encounter(position=position)
     position[:] = 1.0
@@ -51,7 +51,7 @@ def test_bad_encounters_are_refused(changes, said):
 @example(np.pi)
 @example(-np.pi)
 @example(3.1415926535)
-def test_a_canonical_angle_survives_a_quaternion_bit_for_bit(angle):
+def test_canonical_angle_survives_a_quaternion(angle):
     canonical = canonical_angle(angle)
     z, w = np.sin(canonical / 2), np.cos(canonical / 2)
     assert canonical_angle(2.0 * np.arctan2(z, w)) == canonical

@@ -27,7 +27,7 @@ def evaluated(**figures):
     return GenerationResult(None, None, None, None, (), figures=evaluation)
 
 
-def test_the_delivered_set_stands_before_the_replay():
+def test_delivered_set_precedes_the_replay():
     similar = evaluated(**{REPLAY: (0.001, np.nan), WITH: (0.1, 0.2)}).similarity()
     assert list(similar) == [WITH, REPLAY]
     assert similar[WITH] == {"e_position": 0.1, "e_speed": 0.2, "e_heading": None}
@@ -35,7 +35,7 @@ def test_the_delivered_set_stands_before_the_replay():
     assert list(evaluated(**{WITH: (0.1, 0.2)}).similarity()) == [WITH]
 
 
-def test_results_are_counted_indexed_and_made_a_table():
+def test_results_are_counted_and_tabulated():
     """A row for each scenario, vehicle and instant at which it is there; short representations."""
     result = hand_made_run()
     assert (
@@ -62,7 +62,7 @@ def test_results_are_counted_indexed_and_made_a_table():
         assert len(repr(thing)) < 120 and repr(thing).startswith(type(thing).__name__)
 
 
-def test_the_sum_of_two_results_is_saved_and_read_as_one(tmp_path):
+def test_sum_of_results_is_saved(tmp_path):
     made = hand_made_run()
     both = made + replace(made, seed=5)
     assert len(both) == 2 * len(made)
@@ -75,7 +75,7 @@ def test_the_sum_of_two_results_is_saved_and_read_as_one(tmp_path):
 
 
 @pytest.mark.parametrize("k", [10, "a", None])
-def test_a_number_that_no_scenario_has_is_refused_in_a_line(k):
+def test_unknown_scenario_number_is_refused(k):
     with pytest.raises(IndexError, match="a number from 0 to 4 is needed") as refused:
         hand_made_run()[k]
     assert isinstance(refused.value, InputError)
@@ -90,7 +90,7 @@ def test_values_are_tables_in_a_notebook():
     assert "<td>E speed [m]</td><td>lower</td><td>0.2</td>" in shown._repr_html_()
 
 
-def test_what_drivers_do_is_an_attribute_and_vehicles_have_ids():
+def test_drivers_and_ids_are_attributes():
     result = hand_made_run()
     encounter = result.encounter
     assert encounter.reactions and encounter.kind in list(EncounterKind)

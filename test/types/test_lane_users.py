@@ -35,7 +35,7 @@ def led(network):
     }
 
 
-def test_lanes_of_cars_stand_first_and_lead_into_no_others():
+def test_lanes_of_cars_stand_first():
     network = street()
     assert led(network) == {"in": ["motorway"], "motorway": []}
     assert [lane.id for lane in network.others] == ["cycle", "bus", "walk"] and len(
@@ -45,13 +45,13 @@ def test_lanes_of_cars_stand_first_and_lead_into_no_others():
     assert network.open_to(frozenset(("car",))) is network
 
 
-def test_a_bicycle_has_other_lanes_than_a_car_and_the_rules_of_those_it_shares():
+def test_bicycle_has_lanes_of_its_own():
     found = street().open_to(BICYCLE)
     assert led(found) == {"in": [], "cycle": []} and found.rules == ()
     assert street().open_to(BUS).rules[0].lanes == (1,)
 
 
-def test_users_travel_in_messages_and_who_is_nobody_is_refused():
+def test_users_travel_in_messages():
     again = lanes_again(street())
     before = street()
     for one, other in zip(again.of_all, before.of_all, strict=True):
@@ -70,7 +70,7 @@ def test_users_travel_in_messages_and_who_is_nobody_is_refused():
 
 
 @pytest.mark.parametrize("name", VEHICLE_TYPES.names())
-def test_every_type_uses_lanes_as_one_that_is_known(name):
+def test_every_type_uses_known_lanes(name):
     kind = VEHICLE_TYPES[name]
     (user,) = kind.lane_user
     assert kind.walks == (user == "pedestrian") and (

@@ -18,7 +18,7 @@ from scenario_gen.types.markings import Marking, markings
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("drawn", [True, False])
-def test_each_border_is_painted_once_as_what_it_is(side, drawn):
+def test_each_border_is_painted_once(side, drawn):
     network = build_road("t_intersection", None, RoadConfig(lanes=2, traffic_side=side)).lanes
     line = np.array([[20.0, 1.0], [20.0, 5.0]])
     rules = (
@@ -39,7 +39,7 @@ def test_each_border_is_painted_once_as_what_it_is(side, drawn):
     assert np.cos(np.array(yaw) - [lane.yaw[0] for lane in arms.lanes]).min() > 0.99
 
 
-def test_markers_have_dashes_of_their_length_and_replace_those_before():
+def test_markers_have_dashes():
     network = build_road("straight").lanes
     first, *paint = decode(MARKERS, road_markers(network, "map", 5), "road/markings").markers
     assert first.action == 3 and [marker.name for marker in paint] == ["edge", "centre", "arrow"]
@@ -50,7 +50,7 @@ def test_markers_have_dashes_of_their_length_and_replace_those_before():
     assert len(decode(MARKERS, road_markers(None, "map", 5), "road/markings").markers) == 1
 
 
-def test_crossings_are_bars_and_a_cycle_lane_has_a_line_on_each_side():
+def test_crossings_and_cycle_lanes_are_painted():
     config = RoadConfig(crossing="zebra", cycle_lane=2.0)
     painted, plain = (
         markings(build_road("straight", None, config).lanes),

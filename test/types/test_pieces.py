@@ -25,5 +25,5 @@ def test_empty_pieces_are_none():
     ("text", "numbers"),
     [("1 -2.5,3e1", (1.0, -2.5, 30.0)), ("", ()), ("1 two", ()), ("1 nan", ()), ("inf", ())],
 )
-def test_numbers_are_finite_or_there_are_none(text, numbers):
+def test_numbers_are_finite_or_none(text, numbers):
     assert read_numbers(text) == numbers

@@ -13,13 +13,13 @@ IDS = ("a", "b", "c")
 VEHICLES = tuple(map(Vehicle, IDS))
 
 
-def test_edges_that_scenarios_do_not_keep_are_said():
+def test_unenforced_edges_are_named():
     kept, free, cut = GRAPH.sentences(VEHICLES, [SURE])
     assert "held" not in kept and "held" not in cut
     assert free.endswith("(doubtful): not enforced")
 
 
-def test_the_document_has_lag_strength_own_part_and_confidence():
+def test_document_has_lag_and_confidence():
     document = GRAPH.document(VEHICLES, [DOUBTFUL])
     assert [edge["kept"] for edge in document["edges"]] == [False, True]
     assert document["edges"][1] == {

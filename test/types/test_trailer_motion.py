@@ -20,7 +20,7 @@ TRUCK = Vehicle("t", 7.0, 2.5, "truck", Trailer("tl", 8.0, 2.4, 3.5, 6.0))
 CAR = Vehicle("c")
 
 
-def test_a_trailer_hangs_on_its_hitch_and_turns_without_side_slip():
+def test_trailer_hangs_without_side_slip():
     truck = moving([[0.0, 0.0, 0.3, 6.0, -0.2, 0.15]], vehicles=[TRUCK]).with_trailers()
     assert truck.ids == ("t", "tl") and truck.owners == (0, 0) and truck.with_trailers() is truck
     hitch = shifted(truck.position[0], truck.heading[0], -3.5)
@@ -35,7 +35,7 @@ def test_a_trailer_hangs_on_its_hitch_and_turns_without_side_slip():
     assert 0.1 < bend < np.pi / 2.0  # inside of the truck's bend
 
 
-def test_who_hits_a_trailer_is_refused_but_not_the_trailer_behind_its_truck():
+def test_hit_trailer_is_refused():
     rows = [[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], [0.0, -16.0, np.pi / 2.0, 5.0, 0.0, 0.0]]
     scenario = moving(rows, vehicles=[TRUCK, CAR])
     alone = replace(scenario, vehicles=(replace(TRUCK, trailer=None), CAR))
@@ -45,7 +45,7 @@ def test_who_hits_a_trailer_is_refused_but_not_the_trailer_behind_its_truck():
     assert free.valid
 
 
-def test_a_trailer_travels_in_joint_names_and_is_a_second_object_in_openscenario():
+def test_trailer_travels_in_joint_names():
     assert vehicle_of(joint_names([TRUCK])[0]) == TRUCK
     rows = [[0.0, 0.0, 0.0, 5.0, 0.0, 0.1], [-40.0, 0.0, 0.0, 5.0, 0.0, 0.0]]
     case, exported = case_of(moving(rows, vehicles=[TRUCK, CAR]))

@@ -30,7 +30,7 @@ def encounter(present=ALWAYS):
 
 
 @given(presences())
-def test_what_is_held_is_the_value_at_the_nearest_instant_of_presence(present):
+def test_held_values_are_the_nearest(present):
     values = np.arange(27.0).reshape(3, 9)
     rows = held(values, present)
     there = mask(present, 9)
@@ -41,7 +41,7 @@ def test_what_is_held_is_the_value_at_the_nearest_instant_of_presence(present):
 
 
 @given(presences())
-def test_two_are_together_where_both_are_there(present):
+def test_together_means_both_present(present):
     there = mask(present, 9)
     for a, b in ((0, 1), (0, 2), (1, 2)):
         assert (
@@ -51,13 +51,13 @@ def test_two_are_together_where_both_are_there(present):
 
 
 @given(presences(), st.integers(0, 4), st.integers(5, 9))
-def test_presence_in_a_window_is_that_of_its_samples(present, first, last):
+def test_window_presence_is_its_samples(present, first, last):
     there = mask(present, 9)[:, first:last]
     for (begin, end), row in zip(cut(present, first, last), there, strict=True):
         assert list(range(begin, end + 1)) == np.flatnonzero(row).tolist()
 
 
-def test_an_encounter_holds_the_edge_values_where_a_vehicle_is_not_there():
+def test_encounter_holds_its_edge_values():
     made = encounter(np.array([[0, 6], [2, 8]]))
     assert made.position[0, :, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 6, 6]
     assert made.position[1, :, 0].tolist() == [2, 2, 2, 3, 4, 5, 6, 7, 8]
@@ -75,7 +75,7 @@ def test_an_encounter_holds_the_edge_values_where_a_vehicle_is_not_there():
         ([[1, 8], [2, 8]], "nobody is present at its first"),
     ],
 )
-def test_a_presence_that_cannot_be_is_refused(present, said):
+def test_impossible_presence_is_refused(present, said):
     with pytest.raises(InputError, match=said):
         encounter(np.array(present))
     if "nobody" not in said:

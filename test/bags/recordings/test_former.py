@@ -16,7 +16,7 @@ from scenario_gen.output.review.replan import replanned
 BAG = Path(__file__).parent / "former"
 
 
-def test_a_bag_with_hashes_in_diagnostics_and_lanes_in_a_marker_is_read():
+def test_bag_of_earlier_formats_is_read():
     kinds = {message.topic: message.type for message in read_messages(BAG)}
     assert kinds["/road/lanes"].endswith("/Marker")
     assert kinds["/fit/info"].endswith("/DiagnosticArray")
@@ -40,7 +40,7 @@ def test_a_bag_with_hashes_in_diagnostics_and_lanes_in_a_marker_is_read():
     assert lanes.lanes[0].left.shape == lanes.lanes[0].right.shape
 
 
-def test_a_former_bag_is_evaluated_driven_and_planned_again():
+def test_former_bag_is_evaluated_and_driven():
     (found,) = evaluate_bag(BAG)
     assert (found.valid, found.causes, found.notes) == (2, {}, ())
     assert [trial.road.lanes.drawn for trial in read_trials(BAG)] == [True, True]

@@ -13,7 +13,7 @@ from scenario_gen.bags.recordings.message_loss import BEGAN_LATE, MessageLoss
     "topic",
     ["/tf", "/clock", "/vehicle_1/odom", "/vehicle_1/fix", "/verdicts", "/ego/witness", "/map"],
 )
-def test_what_was_published_before_the_recording_is_missed_of_results_only(topic):
+def test_earlier_messages_are_no_loss(topic):
     losses, quality = MessageLoss(lambda _: 1), topic_entry(topic)[1]
     losses.begin(topic, quality)
     for number in (5358, 5359, 5362):

@@ -8,16 +8,11 @@ import re
 import resource
 import shutil
 
-from fuzzing.crash_files import is_refused
 from mcap.writer import CompressionType, Writer
-import numpy as np
 import pytest
 from support.bag_examples import copied, hand_made_run
 
 from msg_conventions import trajectory
-from msg_conventions.documents import encode_document
-from msg_conventions.fits import decode_plan
-from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import bag_warnings, read_messages
 from scenario_gen.bags.storage.config import BagConfig
@@ -55,15 +50,7 @@ def test_a_chunk_has_bounds(tmp_path):
     assert len(list(read_messages(path))) == 1
 
 
-def test_a_bag_has_bounds(tmp_path):
-    path = bomb(tmp_path / "a.mcap", 1_000_000, chunks=20)
-    small = BagConfig(most_bytes=10_000_000)
-    with pytest.raises(InputError, match=r"a\.mcap.*bag\.most_bytes"):
-        list(read_messages(path, config=small))
-    assert len(list(read_messages(path))) == 20
-
-
-def test_the_default_bounds_keep_the_process_small(tmp_path):
+def test_default_bounds_keep_memory_small(tmp_path):
     path = bomb(tmp_path / "a.mcap", 60_000_000, chunks=10)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(InputError, match=r"bag\.most_bytes"):
@@ -107,7 +94,8 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
         tmp_path, topic, lambda data: other if damage == "other type" else data[: len(data) // 2]
     )
     if topic == "/scenarios/info":
-        assert is_refused(lambda: evaluate_bag(broken), topic)
+        with pytest.raises(InputError, match=topic):
+            evaluate_bag(broken)
         return
     (found,) = evaluate_bag(broken)
     if topic == "/scenarios" or damage == "cut":
@@ -134,31 +122,10 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
     ids=["position", "speed", "time", "length"],
 )
 @pytest.mark.parametrize("topic", ["/tracks", "/scenarios"])
-def test_what_no_vehicle_does_is_refused_before_it_takes_memory(tmp_path, topic, change, said):
+def test_impossible_motion_is_refused_early(tmp_path, topic, change, said):
     broken = changed(
         tmp_path, topic, lambda data: trajectory.encode(change(trajectory.decode(data, topic)))
     )
     (found,) = evaluate_bag(broken)
     assert found.valid == 0 and found.result is None
     assert all(re.search(said, message) for message in found.causes[Cause.UNUSABLE].values())
-
-
-def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
-    def far_apart(data):
-        message = trajectory.decode(data, "/scenarios")
-        return trajectory.encode(
-            replace(message, position=message.position * np.array([[[1e5]], [[1.0]]]))
-        )
-
-    (found,) = evaluate_bag(changed(tmp_path, "/scenarios", far_apart))
-    assert re.search(r"gap from .* no vehicles move so", str(found.notes[-1]))
-
-
-def test_a_plan_of_other_vehicles_is_refused(tmp_path):
-    def of_one(data):
-        plan = decode_plan(data)
-        return encode_document(replace(plan, fitted=plan.fitted[:1]))
-
-    messages = {m.topic[1:]: m.data for m in read_messages(changed(tmp_path, "/fit/info", of_one))}
-    with pytest.raises(InputError, match="fit/info: 1 vehicles at 4 points; tracks have 2"):
-        decode_template(messages)

@@ -10,12 +10,12 @@ from scenario_gen.bags.storage.definitions import definition, stored_definitions
 
 
 @pytest.mark.parametrize("kind", sorted(stored_definitions()))
-def test_a_kept_definition_is_that_of_rosbags(kind):
+def test_stored_definition_is_that_of_rosbags(kind):
     text, _ = type_store().generate_msgdef(kind, ros_version=2)
     assert definition(kind) == (text, type_store().hash_rihs01(kind))
 
 
-def test_writing_a_bag_of_results_loads_no_types_of_rosbags():
+def test_writing_loads_no_rosbags_types():
     kinds = {diagnostics.TYPE, markers.TYPE, markers.ARRAY_TYPE, paths.TYPE, trajectory.TYPE}
     kinds |= {pictures.FOOTPRINT_TYPE, roads.MAP_TYPE, roads.POSES_TYPE}
     assert kinds <= stored_definitions().keys()

@@ -23,7 +23,7 @@ def out(tmp_path):
     return tmp_path / "here" / "out"
 
 
-def test_a_new_result_replaces_an_earlier_one_and_says_what_it_is(out):
+def test_new_result_replaces_an_earlier_one(out):
     before = content(out)
     write_texts(out, 3)
     after = content(out)
@@ -35,7 +35,7 @@ def test_a_new_result_replaces_an_earlier_one_and_says_what_it_is(out):
     assert list(out.parent.iterdir()) == [out]
 
 
-def test_an_empty_folder_may_be_there_and_missing_ones_are_made(tmp_path):
+def test_missing_folders_are_made(tmp_path):
     (tmp_path / "empty").mkdir()
     write_texts(tmp_path / "empty", 1)
     write_texts(tmp_path / "a" / "b" / "c", 1)
@@ -67,7 +67,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("words", SPOILED)
-def test_what_is_no_earlier_result_is_not_replaced(out, words):
+def test_other_folders_are_not_replaced(out, words):
     SPOILED[words](out)
     before = content(out.parent), sorted(out.parent.rglob("*"))
     with pytest.raises(InputError, match="name another folder") as refused:
@@ -88,7 +88,7 @@ def test_places_where_no_result_can_be(tmp_path, monkeypatch, place):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "loop"]
 
 
-def test_a_file_that_is_added_while_a_result_is_made_is_kept(out):
+def test_file_added_meanwhile_is_kept(out):
     with pytest.raises(InputError, match="notes"), replaced_folder(out, KIND):
         (out / "notes.txt").write_text("mine")
     assert (out / "notes.txt").read_text() == "mine" and (out / "one.txt").exists()
@@ -137,7 +137,7 @@ def holder(out):
         process.kill()
 
 
-def test_a_second_writer_is_refused_and_told_who_the_first_is(out, holder):
+def test_second_writer_is_refused(out, holder):
     with pytest.raises(
         InputError, match=rf"is being written by process {holder.pid} on .*; wait for it"
     ):
@@ -151,7 +151,7 @@ def test_a_second_writer_is_refused_and_told_who_the_first_is(out, holder):
 
 
 @pytest.mark.parametrize("swept", [True, False])
-def test_what_a_killed_run_left_is_removed_by_the_next_command(out, holder, swept):
+def test_killed_run_is_swept(out, holder, swept):
     holder.kill()
     holder.wait()
     assert len(list(out.parent.iterdir())) == 2
@@ -163,7 +163,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next_command(out, holder, swep
     assert (out / "one.txt").read_text() == "one.txt" * (2 if swept else 3)
 
 
-def test_leftovers_that_may_be_another_s_stay(out):
+def test_leftovers_of_others_stay(out):
     own = out.with_name(f"{PREFIX}out")
     own.mkdir()
     (own / "mine.txt").write_text("mine")

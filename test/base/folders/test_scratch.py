@@ -22,7 +22,7 @@ def left(folder):
 
 
 @pytest.mark.parametrize("error", [None, KeyError("a fault")])
-def test_a_scratch_folder_goes_at_the_end_and_what_the_dead_left_is_swept(tmp_path, error):
+def test_scratch_folder_goes_at_the_end(tmp_path, error):
     with suppress(KeyError), scratch(tmp_path) as place:
         killed_in(tmp_path)
         (place / "deep").mkdir()
@@ -36,7 +36,7 @@ def test_a_scratch_folder_goes_at_the_end_and_what_the_dead_left_is_swept(tmp_pa
 
 
 @pytest.mark.parametrize(("number", "stays"), [(signal.SIGINT, False), (signal.SIGKILL, True)])
-def test_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
+def test_folder_goes_with_its_holder(tmp_path, number, stays):
     """By Ctrl-C at once, after SIGKILL with the next command."""
     pid = os.fork()
     if not pid:
@@ -53,7 +53,7 @@ def test_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
     assert not left(tmp_path)
 
 
-def test_what_is_started_hears_no_ctrl_c():
+def test_children_ignore_ctrl_c():
     def said():
         run = subprocess.run(
             ["sh", "-c", "kill -INT $$; echo deaf"], capture_output=True, text=True, check=False
@@ -74,7 +74,7 @@ def test_what_is_started_hears_no_ctrl_c():
 
 
 @pytest.mark.parametrize("words", [["{}"], ["--out={}"], ["x", "{}/bag"], ["\0", "{}/"]])
-def test_a_command_sweeps_where_its_words_point(tmp_path, words):
+def test_command_sweeps_where_its_words_point(tmp_path, words):
     places = [
         tmp_path / "batch",
         tmp_path / "batch" / "cases",

@@ -86,7 +86,7 @@ def found(bag, tmp_path_factory):
     return search_failures(request_of(bag, "Blind"), out, workers=1), out
 
 
-def test_every_finding_is_certified_and_its_witness_passes(found):
+def test_findings_are_certified_with_passing_witness(found):
     result, out = found
     assert result.findings and all(
         one.passed and not one.outcome.verdict.passed for one in result.findings
@@ -123,7 +123,7 @@ def test_files_say_what_was_found(found):
     assert "Kinds of failure" in page and result.sentences()[0] in page
 
 
-def test_a_stopped_search_goes_on_with_the_same_bytes(bag, found, tmp_path):
+def test_stopped_search_resumes_with_same_bytes(bag, found, tmp_path):
     """A part of the journal first, its last line cut off; another search refuses that journal."""
     journal, kept = tmp_path / f"out{JOURNAL}", found[1].with_name(f"out{JOURNAL}").read_bytes()
     assert kept.count(b"\n") == BUDGET + 1
@@ -137,7 +137,7 @@ def test_a_stopped_search_goes_on_with_the_same_bytes(bag, found, tmp_path):
         )
 
 
-def test_what_is_beside_the_results_is_no_journal_of_this_search_and_stays(bag, found, tmp_path):
+def test_other_journals_are_refused_and_stay(bag, found, tmp_path):
     journal, lines = (
         tmp_path / f"out{JOURNAL}",
         found[1].with_name(f"out{JOURNAL}").read_text().splitlines(keepends=True),
@@ -165,13 +165,13 @@ def test_what_is_beside_the_results_is_no_journal_of_this_search_and_stays(bag, 
         )
 
 
-def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
+def test_failing_planner_keeps_its_drives(bag, tmp_path):
     with pytest.raises(InputError, match="the planner failed: RuntimeError: no idea"):
         search_failures(request_of(bag, "Leaves"), tmp_path / "out", workers=1)
     assert (tmp_path / f"out{JOURNAL}").is_file() and not (tmp_path / "out").exists()
 
 
-def test_a_planner_that_stands_misses_every_goal(bag, tmp_path):
+def test_standing_planner_misses_every_goal(bag, tmp_path):
     result = search_failures(
         request_of(
             bag, "Stands", objective=Objective("goal"), budget=12, assignments=["overtime=1.0"]
@@ -205,7 +205,7 @@ def test_objectives():
             Objective.parsed(text)
 
 
-def test_margins_are_zero_or_less_in_failures_alone(bag):
+def test_margins_are_negative_in_failures_only(bag):
     outcomes = run_trials(read_trials(bag, "2") + read_trials(bag, "1"), f"{__name__}:Blind")
     texts = ("at_fault", "collision", "off_road", "goal", "ttc<3", "pet<1", "imposed_braking>1")
     for text in texts:
@@ -230,7 +230,7 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
         )
 
 
-def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
+def test_command_searches_log_on_a_road(tmp_path):
     words = f"search {LOG} --road {ROAD} --planner {__name__}:Blind --ego 2 --budget 12 --workers 1 --out {tmp_path}/out".split()
     done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
     assert (
@@ -250,7 +250,7 @@ def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
     )
 
 
-def test_a_search_of_an_outcome_weights_its_failures(tmp_path):
+def test_outcome_search_weights_its_failures(tmp_path):
     encounter = replace(labelled("crossing, stops", 0).encounter, name="crossing")
     (drawn,) = (
         decision

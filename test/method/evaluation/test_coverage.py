@@ -68,7 +68,7 @@ def test_figures_matrix_and_picks(template):
     assert document["figures"]["ttc"]["values"] == [None] * 4 and document["index"] == [5, 6, 7, 8]
 
 
-def test_outcomes_of_the_order_are_counted_and_an_empty_set_has_no_picks(template):
+def test_order_outcomes_are_counted(template):
     kept, swapped = (PassingOrder("a", "b", change) for change in list(OrderChange)[:2])
     named = [
         replace(crossing(15.0, k), facts=Facts(order="free", passing_order=(order,)))

@@ -12,7 +12,6 @@ from scipy.spatial.distance import cdist
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.dtw import (
-    blocks,
     dtw_distance,
     feature_extents,
     feature_matrix,
@@ -61,7 +60,7 @@ def test_equals_dtaidistance(shape, band):
     assert dtw_distance(a, b, band=band) == pytest.approx(expected, abs=1e-9)
 
 
-def test_feature_matrix_by_hand_and_against_scipy():
+def test_feature_matrix_equals_scipy():
     assert feature_matrix([0.0, 1.0], [1.0, 5.0]).tolist() == [[0.2, 1.0], [0.0, 0.8]]
     assert not feature_matrix([3.0, 3.0], [1.0, 1.0]).any()  # all distances equal
     rng = np.random.default_rng(2)
@@ -92,11 +91,6 @@ def test_batched_rows_are_the_matrices():
     rows = feature_rows(a, b, feature_extents(a, b), range(3, 7))
     np.testing.assert_array_equal(rows.reshape(5, 4, 30), single[:, 3:7])
     np.testing.assert_allclose(mean_feature(a, b), single.mean(axis=0), atol=1e-15)
-
-
-def test_blocks_cover_every_row_once():
-    for n, width, budget in ((10, 3, 7), (1, 100, 1), (7, 1, 1000)):
-        assert [i for rows in blocks(n, width, budget) for i in rows] == list(range(n))
 
 
 @pytest.mark.parametrize(

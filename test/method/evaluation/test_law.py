@@ -15,7 +15,6 @@ from support.reaction_scenes import answering, lane_encounter, wander
 from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
-from scenario_gen.cli.folder import FolderRequest, generate_all
 from scenario_gen.method.evaluation.criticality import time_to_collision
 from scenario_gen.method.evaluation.law import (
     FEATURES,
@@ -27,16 +26,12 @@ from scenario_gen.method.evaluation.law import (
     VEHICLE_FEATURES,
 )
 from scenario_gen.method.sampling import (
-    checker_of,
-    NaturalScenarios,
-    Plan,
     SamplingConfig,
 )
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import (
     Cause,
     NoteKind,
-    Request,
     Scenario,
 )
 
@@ -71,7 +66,7 @@ def sets(encounters):
     ]
 
 
-def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
+def test_few_encounters_hardly_move_the_law():
     shipped = json.loads(SHIPPED.read_text())["kinds"]["following"]["mean"]
     rng = np.random.default_rng(4)
     centre, spread = np.array(shipped) + 3.0, np.linspace(0.5, 2.0, len(NAMES))
@@ -84,7 +79,7 @@ def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
     assert abs(np.square(distances).mean() - 1.0) < 0.05
 
 
-def test_distances_are_those_of_the_pooled_law_with_smaller_correlations():
+def test_distances_are_those_of_pooled_law():
     """Two prior encounters for the mean and ten for the covariance; correlations lose 30 %."""
     shipped = json.loads(SHIPPED.read_text())["kinds"]["crossing"]
     rng = np.random.default_rng(6)
@@ -107,7 +102,7 @@ def test_distances_are_those_of_the_pooled_law_with_smaller_correlations():
         assert law.distance(row) == pytest.approx(expected)
 
 
-def test_the_joint_features_know_who_answers_the_other():
+def test_joint_features_know_who_answers():
     rng = np.random.default_rng(3)
     leader, stranger = wander(rng, 200), wander(rng, 200)
 
@@ -178,7 +173,7 @@ def test_features_are_those_of_loops(kind, seed):
     assert values["answer of the second"] == pytest.approx(answer)
 
 
-def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usual(encounters):
+def test_unusual_driving_is_rarer(encounters):
     own, fast = encounters[0], replace(encounters[0], speed=3.0 * encounters[0].speed)
     rarity = measures_in(1.0, own).rarity
     alike = measures_in(1.0, own, [replace(fast, name=f"fast {n}") for n in range(9)]).rarity
@@ -187,7 +182,7 @@ def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usu
     assert measures_in(0.0, own).rarity is None
 
 
-def test_encounters_are_told_apart_by_what_they_are_and_not_by_their_names(encounters):
+def test_encounters_are_told_apart_by_motion(encounters):
     scenario = as_scenario(encounters[1])
     others, copies = [replace(one, name="log") for one in encounters[1:]], 5 * [encounters[0]]
     named, alike, copied = (
@@ -198,50 +193,10 @@ def test_encounters_are_told_apart_by_what_they_are_and_not_by_their_names(encou
     assert copied == pytest.approx(measures_in(1.0, encounters[0]).rarity(scenario))
 
 
-def test_vehicles_that_share_no_area_are_in_no_population(encounters):
-    position = encounters[0].position.copy()
-    position[0] += 1000.0
-    assert (
-        measures_in(1.0, encounters[0]).rarity(
-            as_scenario(replace(encounters[0], position=position))
-        )
-        == np.inf
-    )
-
-
-def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
+def test_scenarios_state_their_rarity(sets):
     population, one_driver = (made.generated for made in sets)
     rarities = np.array([scenario.facts.rarity for scenario in population])
     assert len(population) == 40 and population.refused[Cause.UNUSUAL] > 0
     (note,) = (note for note in population.adaptations if note.kind is NoteKind.UNUSUAL)
     assert 1.0 < rarities.max() <= note.values["rarity"] + 1e-9
     assert not one_driver.refused[Cause.UNUSUAL] and one_driver[0].facts.rarity is None
-
-
-def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
-    plan, sampling = (
-        Plan.of(sets[0], POPULATION.sampling, POPULATION.limits, Request()),
-        POPULATION.sampling,
-    )
-    measures = measures_in(1.0, encounters[0], encounters)
-    check = checker_of(plan, sampling, POPULATION.limits, Request()).check
-    natural, any_of_them = (
-        NaturalScenarios.of(plan, check, sampling, 5, given) for given in (measures, None)
-    )
-    numbers = np.random.default_rng(0).standard_normal((40, natural.size))
-    usual, valid = natural.scenarios(numbers), any_of_them.scenarios(numbers)
-    kept = [
-        one is not None and measures.rarity(one) <= natural.filters.rarity.max_rarity
-        for one in valid
-    ]
-    assert [one is not None for one in usual] == kept and sum(kept) < sum(
-        one is not None for one in valid
-    )
-
-
-def test_a_command_generates_each_encounter_as_a_call_or_a_node_that_knows_it_alone(encounters):
-    pairs = [(encounter, "corridor") for encounter in encounters[:2]]
-    made, _ = generate_all(pairs, FolderRequest([], POPULATION, count=5, seed=5))
-    alone = [generate(*pair, POPULATION, count=5, seed=5) for pair in pairs]
-    assert made == alone
-    assert [each.generated.refused for each in made] == [each.generated.refused for each in alone]

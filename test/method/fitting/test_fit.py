@@ -94,7 +94,7 @@ def encounter(request):
     return read_log(request.param).encounters[0]
 
 
-def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(encounter):
+def test_recorded_encounters_fit_two_roads(encounter):
     fitted = 0
     for road_name in ROADS:
         try:
@@ -127,7 +127,7 @@ def turned_otherwise(encounter, fit):
     return found
 
 
-def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before(data):
+def test_straight_drive_has_an_arm_ahead(data):
     """One vehicle's record begins, or ends, in the middle of the junction."""
     for pattern in ("encounter_a_cross*", "encounter_b_left*"):
         (path,) = data.glob(f"trajectories/ngsim_commonroad/{pattern}.csv")
@@ -138,7 +138,7 @@ def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before
             assert not any(loss.kind in ("turn", "conflict") for loss in fit.losses)
 
 
-def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():
+def test_oncoming_vehicles_keep_lanes_apart():
     speed = np.full(80, 9.0)
     encounter = encounter_of(
         driven(straight(0.0, 0.0, 0.3), speed), driven(straight(110.0, 45.0, 0.3 - np.pi), speed)
@@ -167,7 +167,7 @@ def test_ends_do_not_depend_on_changepoints(encounter):
         assert [f.manoeuvre for f in with_.fitted] == [f.manoeuvre for f in without.fitted]
 
 
-def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(encounter):
+def test_template_is_replayed_in_its_order(encounter):
     for road_name in ("four_way", "corridor"):
         road = build_road(road_name, encounter)
         fit = fit_template(
@@ -212,7 +212,7 @@ def crossing_pair():
 
 @pytest.mark.parametrize("road_name", ["four_way"])
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
-def test_who_comes_from_the_right_still_does_and_arrival_times_are_kept(road_name, yaw):
+def test_side_and_arrival_times_are_kept(road_name, yaw):
     encounter = crossing_pair()
     rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     turned = Encounter.sampled(
@@ -237,7 +237,7 @@ def test_who_comes_from_the_right_still_does_and_arrival_times_are_kept(road_nam
     assert fit.requested.start[:, 3].tolist() == pytest.approx([9.0, 6.0])
 
 
-def test_turns_take_the_arm_on_their_side():
+def test_turns_take_arms_on_their_side():
     for angle, name in ((np.pi / 2.0, "left"), (-np.pi / 2.0, "right")):
         speeds = np.full(110, 7.0)
         encounter = encounter_of(
@@ -253,7 +253,7 @@ def test_turns_take_the_arm_on_their_side():
 
 
 @pytest.mark.parametrize("road_name", ["curve", "t_intersection", "four_way"])
-def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_loses_it_on_a_straight_road(
+def test_platoon_keeps_its_bend_and_gaps(
     road_name,
 ):
     bend = turn(0.0, 0.0, 0.0, 20.0, 1.4, 120.0, 400.0)
@@ -270,7 +270,7 @@ def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_loses_it_on_a_strai
     assert "vehicle 0 turns left by 80° in the recording, goes straight on" in losses[0].message
 
 
-def test_scale_out_of_range_is_refused_with_the_figure():
+def test_scale_out_of_range_is_refused():
     encounter = encounter_of(
         driven(straight(0.0, 0.0, 0.0), np.full(150, 12.0)),
         driven(straight(-20.0, 0.0, 0.0), np.full(150, 12.0)),
@@ -285,7 +285,7 @@ def test_scale_out_of_range_is_refused_with_the_figure():
     assert fit.requested.start[0, 3] == pytest.approx(12.0 * fit.fitted[0].scale)
 
 
-def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
+def test_given_ends_are_met_exactly():
     encounter = crossing_pair()
     road = Road(
         "open",
@@ -322,7 +322,7 @@ def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
             fit_template(encounter, every(encounter), road, **bad)
 
 
-def test_who_waits_throughout_stays_and_cannot_be_sent_away():
+def test_waiting_vehicle_cannot_be_sent_away():
     still = np.zeros(100)
     encounter = encounter_of(
         driven(straight(-30.0, 0.0, 0.0), np.full(100, 6.0)),
@@ -353,7 +353,7 @@ def test_who_waits_throughout_stays_and_cannot_be_sent_away():
         )
 
 
-def test_anchors_without_room_are_moved_and_said_and_far_ones_refused():
+def test_anchors_move_near_not_far():
     encounter = encounter_of(
         driven(straight(10.0, 20.0, 0.0), np.full(100, 5.0)),
         driven(straight(10.0, 40.0, 0.0), np.full(100, 5.0)),
@@ -377,7 +377,7 @@ def test_anchors_without_room_are_moved_and_said_and_far_ones_refused():
         fit_template(encounter, every(encounter), far, FittingConfig(placement="identity"))
 
 
-def test_search_finds_a_road_of_the_templates_shape_wherever_it_is():
+def test_search_finds_road_of_same_shape():
     encounter = encounter_of(
         driven(turn(0.0, 0.0, 0.0, 30.0, np.pi / 2.0, 12.0), np.full(100, 7.0)),
         driven(straight(60.0, 3.5, np.pi), np.full(100, 2.0)),
@@ -406,7 +406,7 @@ def test_search_finds_a_road_of_the_templates_shape_wherever_it_is():
 
 
 @pytest.mark.parametrize("end", ["start", "goal"])
-def test_requested_states_suit_each_other_and_who_stands(end):
+def test_requested_states_suit_each_other(end):
     """The second vehicle stands in the primitive at this end; both are 4.8 m long."""
     stands = np.array([True, False] if end == "start" else [False, True])
     fitted = (SimpleNamespace(stands=np.zeros(2, dtype=bool)), SimpleNamespace(stands=stands))

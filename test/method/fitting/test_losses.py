@@ -39,7 +39,7 @@ def place(monkeypatch):
     return lambda placement: monkeypatch.setattr(fit, "_place", lambda *_: placement)
 
 
-def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
+def test_lost_crossing_is_refused_or_allowed(place):
     place(apart(CROSSING, 120.0))
     with pytest.raises(
         LostEncounterError,
@@ -50,7 +50,7 @@ def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
     assert [loss.kind for loss in taken.losses] == ["conflict"]
 
 
-def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place):
+def test_asked_states_lose_crossings_if_allowed(place):
     place(apart(CROSSING, 0.0))
     ends = {
         name: apart(CROSSING, 120.0).tracks[1].curve.points[k]
@@ -67,7 +67,7 @@ def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place)
     assert [loss.kind for loss in taken.losses] == ["conflict"]
 
 
-def test_what_is_kept_or_at_home_is_not_refused(place):
+def test_kept_situations_are_not_refused(place):
     place(apart(CROSSING, 1.0))
     assert not fit_template(CROSSING, SEGMENTATION, OPEN).losses
     place(replace(apart(CROSSING, 120.0), at_home=True))
@@ -104,7 +104,7 @@ SAME, LEFT, INTO = (0.0,) * 5, (3.5,) * 5, (3.5, 3.5, 1.75, 0.0, 0.0)
         (along(SAME, LEFT, ahead=1.0), along(SAME, SAME, ahead=20.0), "lanes"),
     ],
 )
-def test_who_drives_in_whose_lane_is_kept(template, road, kind):
+def test_driver_in_whose_lane_is_kept(template, road, kind):
     assert not find_losses(template, template)
     kinds = [loss.kind for loss in find_losses(template, road)]
     assert [each for each in kinds if each in (*LOSABLE, "lanes")] == [kind]
@@ -115,14 +115,14 @@ def test_who_walks_is_in_no_lane():
     assert not [loss.kind for loss in find_losses(template, road) if loss.kind in LOSABLE]
 
 
-def test_who_is_recorded_beside_another_one_in_its_width_does_not_follow_it():
+def test_vehicle_beside_another_does_not_follow():
     template = along(SAME, (1.7,) * 5, ahead=1.0)
     assert {loss.kind for loss in find_losses(template, along(SAME, LEFT, ahead=1.0))} == {
         "beside"
     }
 
 
-def test_who_passes_whom_and_on_which_side_is_kept():
+def test_passing_side_is_kept():
     ahead, past = np.arange(0.0, 150.0), np.arange(-30.0, 270.0, 2.0)
     swerve = np.interp(past, [-10.0, 20.0, 60.0, 90.0], [0.0, 3.5, 3.5, 0.0])
 
@@ -143,7 +143,7 @@ def test_who_passes_whom_and_on_which_side_is_kept():
         assert kind in [loss.kind for loss in find_losses(template, scene(-1.0, still))]
 
 
-def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
+def test_losses_are_named_and_allowed(place):
     speed = np.full(150, 10.0)
     encounter = lane_encounter(speed, speed)
     first, second = clean_tracks(encounter)
@@ -171,6 +171,6 @@ def test_arms_without_vehicles_are_counted(driven):
     )
 
 
-def test_only_what_is_known_can_be_allowed():
+def test_only_known_losses_can_be_allowed():
     with pytest.raises(InputError, match="lost_conflict"):
         FittingConfig(allow="everything")

@@ -25,8 +25,13 @@ CASE = parked(2)
 ROAD, QUERY = CASE.road, CASE.query
 
 
+@pytest.fixture(scope="module")
+def ours():
+    return PoseRrtStarConnect().plan_poses(ROAD, QUERY, Budget(1000), 7)
+
+
 @pytest.mark.parametrize("name", PLANNERS)
-def test_each_planner_finds_a_sound_curve_and_keeps_its_seed(name):
+def test_each_planner_finds_a_sound_curve(ours, name):
     plans = [OmplPlanner(name).plan_poses(ROAD, QUERY, Budget(200), 7) for _ in range(2)]
     path = plans[0].path
     np.testing.assert_array_equal(path, plans[1].path)
@@ -36,20 +41,18 @@ def test_each_planner_finds_a_sound_curve_and_keeps_its_seed(name):
     turn = np.abs(wrap_angle(np.diff(path[:, 2])))
     lengths = np.hypot(*np.diff(path[:, :2], axis=0).T)
     assert (turn <= QUERY.curvature * lengths * 1.02 + 1e-9).all()
-    ours = PoseRrtStarConnect().plan_poses(ROAD, QUERY, Budget(1000), 7)
     assert plans[0].cost == pytest.approx(path_length(path)) and plans[0].cost < 1.3 * ours.cost
 
 
-@pytest.mark.parametrize("name", PLANNERS)
-def test_routes_are_planned_by_the_planner_that_is_chosen(name):
+def test_routes_use_the_chosen_planner():
     fit = straight_fit(QUERY)
-    (route,) = plan_routes(ROAD, fit, PlanningConfig(planner=name), 1)
+    (route,) = plan_routes(ROAD, fit, PlanningConfig(planner="ompl_rrt_connect"), 1)
     assert route.searched == 1
     free = sweep_is_free(ROAD, route.points, QUERY.length, QUERY.width)[:, 0] > 0.0
     assert free.all()
 
 
-def test_a_hang_a_crash_and_a_change_of_mind_are_answers():
+def test_hang_crash_and_cancel_are_answers():
     endless = Budget(None)
     with pytest.raises(BudgetSpentError, match="did not answer within 1 s and was ended"):
         config = OmplConfig(time_limit=1.0)

@@ -25,7 +25,7 @@ def drive(sigma, length, speed, course=0.0):
 
 
 @pytest.mark.parametrize("speed", [5.0, 15.0])
-def test_what_a_drive_was_drawn_with_is_found(speed):
+def test_drawn_steering_is_found(speed):
     speeds = np.full(len(TIME), speed)
     found = Steering.of(TIME, drive(0.03, 0.6, speeds), speeds, 100.0)
     assert found.length == pytest.approx(0.6, rel=0.35)
@@ -44,7 +44,7 @@ def test_a_turn_is_course_not_correction():
 
 
 @pytest.mark.parametrize("yaw", [np.zeros(len(TIME)), 0.01 * TIME])
-def test_who_does_not_correct_is_not_made_to(yaw):
+def test_perfect_steering_has_no_deviation(yaw):
     assert Steering.of(TIME, yaw, np.full(len(TIME), 8.0), 100.0).root(
         np.linspace(0.0, 100.0, 101)
     ).shape == (101, 0)
@@ -57,7 +57,7 @@ def test_who_stands_has_none():
     )
 
 
-def test_it_is_drawn_with_the_stated_strength_and_ends_as_planned():
+def test_steering_has_its_stated_strength():
     speeds = np.full(len(TIME), 8.0)
     found = Steering.of(TIME, drive(0.03, 0.6, speeds), speeds, 960.0)
     root = found.root(np.linspace(0.0, 960.0, 961))

@@ -43,7 +43,7 @@ def gaps_behind(result, edge):
     return np.array(gaps)
 
 
-def test_half_of_the_drivers_are_nearer_and_all_are_within_the_bounds():
+def test_half_of_drivers_are_nearer():
     z = np.random.default_rng(0).standard_normal(20_000)
     nobody = np.zeros(2)
     free = DriverGap(nobody, nobody, 1.0, 0.0, -4.0, 4.0).delay(z)
@@ -61,7 +61,7 @@ def test_half_of_the_drivers_are_nearer_and_all_are_within_the_bounds():
     assert DriverGap(nobody, nobody, 1.0, 0.0, 0.0, 0.0).delay(z) == pytest.approx(0.0)
 
 
-def test_other_drivers_accept_other_gaps_within_the_certificate():
+def test_drivers_accept_other_gaps():
     (edge,) = Situation.of(CROSSING).reactions.edges
     recorded = gaps_behind(chain(CROSSING, gap_sigma=0.0).run(), edge)
     other = chain(CROSSING)
@@ -73,7 +73,7 @@ def test_other_drivers_accept_other_gaps_within_the_certificate():
 
 
 @pytest.mark.parametrize("sigma", [0.05, 0.1])
-def test_a_sigma_that_is_not_cut_is_what_is_drawn(sigma):
+def test_untruncated_sigma_is_what_is_drawn(sigma):
     z = np.random.default_rng(0).standard_normal(20_000)
     ramp = Ramp(np.linspace(0.0, 10.0, 11), np.ones(11), np.zeros(11))
     ((headway,), (gap,)) = (Situation.of(each).reactions.edges for each in (LANE, CROSSING))

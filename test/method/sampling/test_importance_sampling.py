@@ -28,14 +28,14 @@ def drawn(seed, count):
     return PROPOSAL.transform(rng.normal(size=(count, DIMENSION)), rng.normal(size=count))
 
 
-def test_weights_are_the_ratio_of_the_densities():
+def test_weights_are_ratios_of_densities():
     z = np.concatenate((drawn(0, 500), np.random.default_rng(1).normal(size=(500, DIMENSION))))
     proposed = 0.1 * NATURAL.pdf(z) + 0.9 * SHIFTED.pdf(z)
     np.testing.assert_allclose(PROPOSAL.weights(z), NATURAL.pdf(z) / proposed, rtol=1e-9)
     np.testing.assert_allclose(PROPOSAL.density_ratio(z), proposed / NATURAL.pdf(z), rtol=1e-9)
 
 
-def test_one_sample_in_ten_is_natural_and_the_others_are_shifted():
+def test_one_in_ten_is_natural():
     z = np.random.default_rng(2).normal(size=(20_000, DIMENSION))
     selector = np.random.default_rng(3).normal(size=len(z))
     samples = PROPOSAL.transform(z, selector)
@@ -61,7 +61,7 @@ def test_intervals_of_the_share_cover_it():
     assert binomtest(covered, 300, 0.95).pvalue > 0.01
 
 
-def test_no_hits_give_the_rule_of_three():
+def test_no_hits_give_rule_of_three():
     """If none of n candidates with weights of at most ten is a hit, at most 3 × 10 / n are."""
     assert estimated_share(np.zeros(0), 600) == (0.0, 0.0, pytest.approx(0.05))
     assert estimated_share(np.zeros(0), 0)[1:] == (0.0, 1.0)

@@ -13,7 +13,6 @@ from scenario_gen.method.sampling import relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.numbers import ModelNumbers, VehicleNumbers
-from scenario_gen.method.sampling.reaction_transform import advance, lateness
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.types import FOLLOW, Reaction, ReactionGraph, Request
 
@@ -40,7 +39,7 @@ def test_the_slices_are_consecutive_and_complete():
 
 
 @pytest.mark.parametrize("name", VehicleNumbers._fields)
-def test_each_slice_moves_what_it_is_named_after(model, name):
+def test_each_slice_moves_its_namesake(model, name):
     vehicle, nominal = model.vehicles[0], model.warp.nominal
     z = np.zeros((2, vehicle.numbers.total))
     z[1, getattr(vehicle.numbers, name)] = 1.5
@@ -57,33 +56,3 @@ def test_each_slice_moves_what_it_is_named_after(model, name):
     assert moved[expected] and not any(
         value for key, value in moved.items() if key not in (expected, "speed")
     )
-
-
-def test_reactions_read_the_slices_that_move_time_and_place(model):
-    vehicle, at = model.vehicles[0], np.array([5.0, 10.0])
-    late = lateness(vehicle, at, model.warp.nominal, NoiseScale())
-    ahead = advance(vehicle, at, NoiseScale())
-    time, place = np.flatnonzero(late.any(axis=0)), np.flatnonzero(ahead.any(axis=0))
-    numbers = vehicle.numbers
-    everything = np.arange(numbers.total)
-    assert set(time) == set(everything[numbers.clock])
-    moving = (numbers.speed, numbers.end_speeds, numbers.strength)
-    assert set(place) <= set(np.concatenate([everything[part] for part in moving]))
-    assert set(place) & set(everything[numbers.end_speeds])
-
-
-def test_a_further_number_changes_no_reaction(model):
-    """An unused lateral number in front of all others: the same candidate, one number longer."""
-    longer = [
-        replace(vehicle, lateral_root=np.pad(vehicle.lateral_root, ((0, 0), (1, 0))))
-        for vehicle in model.vehicles
-    ]
-    other = CandidateModel(tuple(longer), model.warp, model.reactions)
-    assert other.size == model.size + len(longer)
-    eps = np.random.default_rng(0).standard_normal((4, model.size))
-    first = [part.start for part in model.numbers.vehicles]
-    states = [
-        each.draw(numbers, NoiseScale()).states(np.arange(0.0, 10.0, 0.5))
-        for each, numbers in ((model, eps), (other, np.insert(eps, first, 1.0, axis=1)))
-    ]
-    np.testing.assert_allclose(states[0], states[1], atol=1e-9)

@@ -71,7 +71,7 @@ def model_of(encounter, result):
     return build_model(plan, CONFIG.sampling).model
 
 
-def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_residual(case):
+def test_transform_gives_the_stated_residual(case):
     encounter, _, made, _ = case
     model = model_of(encounter, made)
     (edge,) = kept_reactions(Situation.of(encounter), CONFIG.sampling).edges
@@ -108,7 +108,7 @@ def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_re
         assert free.std() > 1.2
 
 
-def test_a_mixing_is_linear_so_mirror_images_stay_mirror_images(case):
+def test_mixing_is_linear(case):
     encounter, _, made, _ = case
     model = model_of(encounter, made)
     transform = ReactionTransform.of(
@@ -125,7 +125,7 @@ def test_a_mixing_is_linear_so_mirror_images_stay_mirror_images(case):
     )  # alone as among others
 
 
-def test_what_is_published_answers_as_the_template_does(case):
+def test_published_reactions_answer(case):
     encounter, _, made, free = case
     (edge,) = made.generated.reactions
     named = "2 follows 1" if edge.kind == FOLLOW else "2 yields to 1"
@@ -154,7 +154,7 @@ def test_what_is_published_answers_as_the_template_does(case):
         assert 0.3 < seen.spread < 0.8 * before.spread
 
 
-def test_who_gives_way_is_slow_when_the_other_one_passes():
+def test_yielder_is_slow_at_passing():
     encounter = labelled("meets another one closely", 3).encounter
     (edge,) = Situation.of(encounter).reactions.edges
     road, segmentation = (
@@ -181,7 +181,7 @@ def test_who_gives_way_is_slow_when_the_other_one_passes():
     assert min(lost[0]) > 4.0 > min(lost[1])
 
 
-def test_nobody_is_made_to_wait_where_another_order_is_asked_for():
+def test_other_orders_wait_for_nobody():
     assert kept_reactions(Situation.of(CROSSING), CONFIG.sampling).edges
     assert kept_reactions(Situation.of(CROSSING), CONFIG.sampling, "free").edges == ()
     assert kept_reactions(Situation.of(CROSSING), CONFIG.sampling, "swap").edges == ()

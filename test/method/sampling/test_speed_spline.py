@@ -12,13 +12,11 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
-from benchmarks._paper_speed_knots import speed_knots as paper_speed_knots
 from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, SLOWING_S
 from scenario_gen.method.sampling.speed_profile import mean as mean_module
 from scenario_gen.method.sampling.speed_profile.knots import (
     lengthened_waits,
     MIN_WAIT_S,
-    speed_knots,
 )
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
@@ -26,7 +24,6 @@ from scenario_gen.method.sampling.speed_profile.mean import (
     mean_speed,
     MeanSpeed,
     Motion,
-    rounded_lines,
     Target,
 )
 from scenario_gen.method.sampling.speed_profile.model import kernel_root, SpeedModel
@@ -89,7 +86,7 @@ def test_basis_is_scipys():
     )
 
 
-def test_a_stand_is_exactly_zero_and_the_rest_is_not():
+def test_stand_is_exactly_zero():
     basis = spline()
     c = np.where(basis.still, 0.0, 1.0)
     inside = np.linspace(*STANDS[0], 300)
@@ -98,7 +95,7 @@ def test_a_stand_is_exactly_zero_and_the_rest_is_not():
     assert np.diff(basis.breaks).min() > 0.75 * KNOT_SPACING_S
 
 
-def test_mean_keeps_what_must_hold_and_is_the_minimum():
+def test_mean_speed_is_the_minimum():
     speed = 8.0 + 2.0 * np.sin(TIME / 2.0)
     basis = spline([])
     wanted = target(speed, length=170.0, ends=(7.0, 9.5))
@@ -143,28 +140,6 @@ def test_no_mean_where_none_can_be():
     )
 
 
-def test_lines_once_rounded_fit_better_than_lines_alone():
-    speed = np.interp(TIME, CLOCK, [8.0, 11.0, 4.0, 4.0, 9.0])
-    smooth = np.convolve(np.pad(speed, 6, mode="edge"), np.ones(13) / 13.0, mode="valid")
-    basis = spline([])
-    ends, moves = (8.0, 9.0), np.zeros(4, dtype=bool)
-    knots = speed_knots(CLOCK, moves, [], ends, [])
-    rounded = rounded_lines(basis, knots, TIME, smooth, ends)
-    straight = paper_speed_knots(CLOCK, moves, [], TIME, smooth, ends, 0.0).lines
-    none, length = np.zeros(0), float(smooth[:-1].sum() * 0.1)
-    means = [
-        mean_speed(
-            basis,
-            Target(knots.knot, speeds, none, none, ends, length),
-            plain(basis),
-            loose(basis, jerk=1e3),
-        )
-        for speeds in (rounded, straight)
-    ]
-    off = [np.sqrt(np.square(basis.design(TIME) @ c - smooth).mean()) for c in means]
-    assert off[0] < off[1]
-
-
 def drawn(count=4000, sigma=0.8, jerk=3.0):
     speed = np.interp(TIME, [3.0, 6.5, 13.5, 17.0], [1.0, 0.0, 0.0, 1.0]) ** 2 * (
         6.0 + np.sin(1.5 * TIME)
@@ -180,7 +155,7 @@ def drawn(count=4000, sigma=0.8, jerk=3.0):
     return model, ends, longer, model.draw(z, longer, pace, same, 0.0 * same)
 
 
-def test_draws_keep_ends_length_stands_and_bounds():
+def test_draws_keep_ends_stands_and_bounds():
     model, ends, longer, (c, ok) = drawn()
     basis = model.spline
     assert ok.all()
@@ -192,7 +167,7 @@ def test_draws_keep_ends_length_stands_and_bounds():
     assert jerk.max() < max(1.06 * 3.0, 1.01 * np.abs(plain(basis).jerk @ model.mean).max())
 
 
-def test_a_speed_that_is_given_holds_on_any_clock():
+def test_given_speed_holds_on_any_clock():
     model, ends, _, _ = drawn(1)
     pace = np.array([[0.9, 1.2]])
     c, _ = model.draw(
@@ -206,7 +181,7 @@ def test_a_speed_that_is_given_holds_on_any_clock():
     assert model.spline.length @ (c[0] - model.mean) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_draws_have_the_stated_covariance_where_no_bound_is_near():
+def test_draws_have_the_stated_covariance():
     model, _, _, (c, _) = drawn(20_000, jerk=1e3)
     free = ~fixed_coefficients(model.spline, (0.0, 0.0))[0]
     away = free & (model.mean > 5.0 * np.sqrt(np.square(model.factor).sum(axis=1)))
@@ -214,7 +189,7 @@ def test_draws_have_the_stated_covariance_where_no_bound_is_near():
     assert np.abs(found - stated).max() < 0.05 * stated.max()
 
 
-def test_the_kernel_is_that_of_a_derivative():
+def test_kernel_is_of_a_derivative():
     t = np.linspace(0.0, 10.0, 60)
     root = kernel_root(t, np.full(60, 0.3), 1.2)
     d = t[:, None] - t
@@ -225,7 +200,7 @@ def test_the_kernel_is_that_of_a_derivative():
 
 @settings(max_examples=50)
 @given(st.floats(1.0, 1.8), st.floats(2.0, 17.0), st.floats(0.3, 3.0))
-def test_the_clock_is_slow_where_it_must_be_and_known_before(need, at, width):
+def test_clock_slows_where_it_must(need, at, width):
     grid = np.linspace(0.0, 20.0, 201)
     needs = np.where(np.abs(grid - at) < 0.5 * width, need, 1.0)
     clock = slowed_clock(grid, [np.ones(201), needs], 2.0)
@@ -238,7 +213,7 @@ def test_the_clock_is_slow_where_it_must_be_and_known_before(need, at, width):
     assert slowed_clock(grid, [needs], 1.01).time[-1] <= 20.2 + 1e-9
 
 
-def test_motion_on_a_slowed_clock_is_the_chain_rule():
+def test_motion_follows_the_chain_rule():
     basis = spline([])
     grid = np.linspace(0.0, 20.0, 2001)
     clock = clock_from_rate(grid, 1.0 + 0.2 * np.sin(0.5 * grid) ** 2)
@@ -256,7 +231,7 @@ def test_motion_on_a_slowed_clock_is_the_chain_rule():
 
 
 @pytest.mark.parametrize("seconds", [0.3, 1.0, MIN_WAIT_S, 4.0])
-def test_short_waits_are_lengthened_about_their_middle(seconds):
+def test_short_waits_are_lengthened(seconds):
     waits = [
         Wait(0, 1.0, 9.0),
         Wait(1, 6.0, 6.0 + seconds),
@@ -268,7 +243,7 @@ def test_short_waits_are_lengthened_about_their_middle(seconds):
     assert lengthened_waits(1, waits, creeping=True) == [(12.0, 15.0)]
 
 
-def test_who_stands_at_an_end_has_no_speed_there():
+def test_standing_end_has_no_speed():
     """Whatever speed is given for that end."""
     stands = SimpleNamespace(still=np.array([True, True, False, False]), size=4)
     given, value = fixed_coefficients(stands, (0.3, 5.0))

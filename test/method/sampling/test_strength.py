@@ -26,7 +26,7 @@ def strength_of(spline, speed):
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.2, 1.4])
-def test_braking_is_stronger_by_the_factor_and_the_place_is_the_same_afterwards(factor):
+def test_strength_scales_braking_only(factor):
     spline, speed = slowing()
     mean, strength = strength_of(spline, speed)
     other = mean + strength.changes(np.log([[factor, 1.0]]))[0]
@@ -39,7 +39,7 @@ def test_braking_is_stronger_by_the_factor_and_the_place_is_the_same_afterwards(
     assert unchanged == pytest.approx(0.0, abs=0.05)
 
 
-def test_nobody_is_stronger_than_drivers_usually_are():
+def test_strength_is_that_of_drivers():
     spline, speed = slowing()
     mean, strength = strength_of(spline, speed)
     strong = mean + strength.changes(np.log([[2.2, 2.2]]))[0]

@@ -42,14 +42,14 @@ def before_and_after(scenarios):
     )
 
 
-def test_scenarios_begin_nearer_to_the_conflict_and_end_sooner_behind_it(encounter):
+def test_trimmed_scenarios_are_nearer(encounter):
     whole, cut = (before_and_after(drawn(encounter, share)) for share in (0.0, 0.8))
     assert (cut.mean(axis=0) < 0.85 * whole.mean(axis=0)).all()
     assert (cut.std(axis=0) > whole.std(axis=0)).all()
     assert (cut > 0.0).all()
 
 
-def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
+def test_ego_states_prevent_trimming(encounter):
     request = Request(ego=encounter.vehicles[0].id)
     whole, cut = (drawn(encounter, share, request) for share in (0.0, 0.8))
     assert all(
@@ -58,7 +58,7 @@ def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
     )
 
 
-def test_what_stays_is_the_conflict_and_a_second(encounter):
+def test_conflict_and_a_second_stay(encounter):
     (conflict,) = find_conflicts(encounter)
     window = trimming_of(Situation.of(encounter), 0.5, FREE)
     assert window.core[0] == pytest.approx(min(conflict.entry_first, conflict.entry_second))
@@ -73,7 +73,7 @@ def test_what_stays_is_the_conflict_and_a_second(encounter):
     assert trimming_of(Situation.of(replace(encounter, position=position)), 0.5, FREE) is None
 
 
-def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widened():
+def test_trimming_is_bounded_by_room():
     window = Trimming(np.array([4.0, 8.0]), np.array([0.5, 1.0]))
     kept, span = np.array([[4.0, 8.0], [1.0, 9.0]]), np.array([[0.0, 10.0], [2.0, 8.0]])
     np.testing.assert_allclose(
@@ -84,7 +84,7 @@ def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widene
 
 @pytest.mark.parametrize(("kind", "seed"), [("crossing, stops", 3), ("crossing, rolls", 2)])
 @pytest.mark.parametrize("drivers", [0.5, 1.0])
-def test_what_a_recording_holds_by_its_last_sample_is_kept(kind, seed, drivers):
+def test_last_sample_keeps_the_conflict(kind, seed, drivers):
     """The record ends as the second one enters, and the drive without deviations ends before."""
     whole = labelled(kind, seed).encounter
     last = math.ceil(conflict_of(whole, 0, 1).entry_second / whole.dt) + 1

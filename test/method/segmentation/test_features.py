@@ -11,12 +11,11 @@ import numpy as np
 
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.segmentation.features import without_outliers, without_spikes
-from scenario_gen.types.fit import Segmentation
 
 
 @settings(max_examples=30)
 @given(at=st.integers(2, 57), size=st.floats(5.0, 1e6), seed=st.integers(0, 1000))
-def test_a_spike_is_replaced_by_what_lies_between(at, size, seed):
+def test_spike_is_replaced(at, size, seed):
     smooth = (
         np.cumsum(np.random.default_rng(seed).normal(size=(60, 2)) * 0.01, axis=0)
         + np.arange(60.0)[:, None]
@@ -59,13 +58,3 @@ def test_outliers_change_no_changepoint(encounter_of):
     points = segment(encounter).changepoints
     assert len(points)
     assert np.abs(segment(spoilt).changepoints - points).max() <= 3
-
-
-def test_a_long_stretch_without_a_changepoint_is_said():
-    quiet = Segmentation(np.zeros(400, np.int64), np.zeros(0, np.int64), np.zeros(400), ("",))
-    assert "no changepoint in 40 s" in quiet.remark(40.0)
-    assert quiet.remark(15.0) == ""
-    assert (
-        Segmentation(np.repeat([0, 1], 200), np.array([200]), np.zeros(400), ("", "")).remark(40.0)
-        == ""
-    )

@@ -43,7 +43,7 @@ def test_finds_states_and_shares_them(dimensions):
     assert np.abs(posterior.changepoints - [60, 120, 180]).max() <= 2
 
 
-def test_same_seed_same_bytes_and_scale_does_not_matter():
+def test_same_seed_gives_same_bytes():
     x, _ = two_states(6)
     a = posterior_of(x, seed=3)
     b = posterior_of(x, seed=3)
@@ -53,22 +53,8 @@ def test_same_seed_same_bytes_and_scale_does_not_matter():
     np.testing.assert_array_equal(posterior_of(x * 1024.0 - 512.0, seed=3).labels, a.labels)
 
 
-def test_noise_is_one_state():
-    posterior = posterior_of(np.random.default_rng(0).normal(size=(300, 4)), seed=0)
-    assert posterior.labels.max() == 0
-    assert posterior.probability.max() < 0.2
-
-
-def test_several_sequences_share_states_and_do_not_touch():
-    x, labels = two_states(7)
-    posterior = posterior_of(np.vstack([x, x[::-1]]), seed=0, lengths=[240, 240])
-    assert np.mean(posterior.labels != np.concatenate([labels, labels[::-1]])) <= 0.02
-    assert 240 not in posterior.changepoints
-    assert posterior.probability[240] == 0.0
-
-
 @pytest.mark.parametrize("tremble", [1e-7, 0.1])
-def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
+def test_quiet_channel_hides_nothing(tremble):
     """Scaled to unit variance, the noise of a standing vehicle hid all other changes."""
     x, labels = two_states(8)
     still = tremble * np.random.default_rng(1).normal(size=(240, 2))
@@ -99,33 +85,6 @@ def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
     assert intervals.shape == (len(posterior.changepoints), 2)
     assert (intervals[:, 0] <= intervals[:, 1]).all()
     assert posterior.primitives().sum() == pytest.approx(1.0)
-
-
-def test_states_whose_means_lie_close_are_told_apart():
-    """Means of length 2.2, spread over 6 channels of unit variance."""
-    rng = np.random.default_rng(9)
-    labels = np.repeat([0, 1, 2, 0, 1, 2], 50)
-    means = rng.normal(size=(3, 6))
-    x = (
-        rng.normal(size=(300, 6))
-        + 2.2 * means[labels] / np.linalg.norm(means, axis=1)[labels][:, None]
-    )
-    posterior = posterior_of(x, seed=2)
-    assert posterior.labels.max() == 2
-    assert np.mean(posterior.labels != labels) <= 0.05
-
-
-def test_probability_within_counts_each_sample_once():
-    x, _ = two_states(10)
-    posterior = posterior_of(np.vstack([x, x]), seed=0, lengths=[240, 240])
-    wide = posterior.probability_within(5)
-    for t in (0, 58, 66, 235, 244, 479):
-        low, high = max(t - 5, 0), min(t + 6, 480)
-        near = [
-            any(low <= c < high and c != 240 for c in np.flatnonzero(np.diff(row)) + 1)
-            for row in posterior.samples
-        ]
-        assert wide[t] == pytest.approx(np.mean(near))
 
 
 def many_states(seed: int, states: int = 6, dwell: int = 60, visits: int = 3, dimensions: int = 3):
@@ -176,20 +135,7 @@ def test_truncation_grows_until_there_is_room():
     assert few.states == 10
 
 
-def test_heavy_tails_are_told_from_states():
-    x, labels = many_states(5)
-    rng = np.random.default_rng(0)
-    means = np.array([x[labels == k].mean(axis=0) for k in range(6)])
-    heavy = means[labels] + (x - means[labels]) / np.sqrt(
-        rng.chisquare(3.0, size=(len(x), 1)) / 3.0
-    )
-    posterior = posterior_of(heavy, seed=0)
-    assert 0.0 < posterior.dof <= 6.0
-    assert found_as_drawn(posterior, labels)
-    assert posterior_of(x, seed=0).dof == 0.0
-
-
-def test_outliers_are_told_by_their_own_sequence():
+def test_outliers_belong_to_their_sequence():
     x = (
         np.random.default_rng(2).normal(size=(100, 1))
         + np.where(np.arange(100) < 50, 0.0, 100.0)[:, None]
@@ -198,11 +144,3 @@ def test_outliers_are_told_by_their_own_sequence():
     for ends, hidden in (([50, 100], [49]), ([100], [])):
         usual = usual_distances(x, np.array(ends))
         assert np.flatnonzero(np.isnan(hide_outliers(x, usual, np.array(ends)))).tolist() == hidden
-
-
-def test_a_sequence_shorter_than_the_order_is_named():
-    x, _ = two_states(7)
-    with pytest.raises(
-        ValueError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"
-    ):
-        posterior_of(x, lengths=[100, 3, 137], emission="autoregressive", order=2)

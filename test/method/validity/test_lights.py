@@ -47,7 +47,7 @@ def test_states_move_with_the_encounter(result):
     assert len(greens) > 6
 
 
-def test_a_state_is_known_until_a_vehicle_crosses(result):
+def test_light_is_known_until_a_crossing(result):
     scenario = result[0]
     (light,) = [light for light in scenario.facts.lights if light.id == "A"]
     crosses = light.crossing(scenario, 0)
@@ -60,7 +60,7 @@ def test_a_state_is_known_until_a_vehicle_crosses(result):
         assert shown.schedule.at(crosses) == expected
 
 
-def test_a_vehicle_that_runs_red_is_refused(result):
+def test_vehicle_running_red_is_refused(result):
     scenario = result[0]
     early = tuple(
         replace(light, schedule=SignalSchedule.cycle((1.0, 999.0), ("green", "red")))
@@ -113,7 +113,7 @@ def assert_same_states(recorded, scenario, tolerance):
             assert shown.replace("off", "unknown") == same.schedule.at(time)
 
 
-def test_fixed_program_has_an_offset_that_suits_the_encounter():
+def test_fixed_program_suits_the_encounter():
     (encounter,) = read_log(signalised(lights=False)).encounters
     config = {"road.priority": "signals", "road.signals": "fixed"}
     result = generate(encounter, "four_way", config, count=5)
@@ -144,7 +144,7 @@ def phases_of(schedule):
     return phases.starts, phases.states
 
 
-def test_a_stop_at_red_is_lost_where_the_road_has_no_light():
+def test_stop_at_red_needs_a_light():
     (encounter,) = read_log(signalised()).encounters
     lost = "vehicle 2 stops at red, and the road has no light there"
     for road in ("four_way", "corridor"):
@@ -162,7 +162,7 @@ def test_a_corridor_has_the_recorded_lights():
         assert light.schedule.at(light.crossing(scenario, 1)) == "green"
 
 
-def test_a_red_runner_is_named_and_stays_one():
+def test_red_runner_stays_one():
     table = signalised()
     table.loc[(table.vehicle == "1") & (table.signal != ""), "signal"] = "red"
     (encounter,) = read_log(table).encounters

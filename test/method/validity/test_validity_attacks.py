@@ -43,7 +43,7 @@ def causes(scenario, **known):
 
 @pytest.mark.parametrize("column", [0, 1, 3])
 @pytest.mark.parametrize("end", ["start", "end"])
-def test_what_was_asked_is_never_near_to_nan(column, end):
+def test_nan_requests_are_never_met(column, end):
     scenario = passing()
     asked = {"start": states(scenario, 0), "end": states(scenario, -1)}
     assert causes(scenario, requested=BoundaryStates(**asked)) == []
@@ -59,14 +59,14 @@ def test_nan_frees_no_state():
     assert Cause.BOUNDARY_STATE in causes(scenario, requested=asked)
 
 
-def test_a_request_for_fewer_vehicles_is_refused():
+def test_request_for_fewer_vehicles_is_refused():
     scenario = passing()
     with pytest.raises(InputError, match="states were requested for 1"):
         causes(scenario, requested=BoundaryStates(states(scenario, 0), states(scenario, -1)[:1]))
 
 
 @pytest.mark.parametrize("index", [-1, 2])
-def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
+def test_wait_of_nobody_is_refused(index):
     with pytest.raises(InputError, match=f"name vehicle {index}"):
         causes(passing(), waits=[Wait(index, 2.0, 8.0)])
     with pytest.raises(InputError, match=f"name vehicle {index}"):
@@ -76,7 +76,7 @@ def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
 @pytest.mark.parametrize(
     ("present", "ends"), [([0, 1], "leaves"), ([99, 100], "enters"), ([50, 51], "enters")]
 )
-def test_who_stands_in_the_way_does_not_vanish(present, ends):
+def test_standing_vehicle_does_not_vanish(present, ends):
     """Its first and last state are as asked, it never moves, and it is gone when the other one drives through its place."""
     template = scenario_of([straight(0, 0, 0, 0.0, TIME), straight(-25, 9, 0, 5.0, TIME)], TIME)
     arrays = (template.time, template.position, template.heading, template.speed)
@@ -105,16 +105,8 @@ def test_who_stands_in_the_way_does_not_vanish(present, ends):
     )
 
 
-@pytest.mark.parametrize(
-    "rows", [[[0.9, 50.7], [51, 100]], [[np.nan, 50], [51, 100]], [["0", "50"], ["51", "100"]]]
-)
-def test_a_presence_is_of_whole_numbers(rows):
-    with pytest.raises(InputError, match="whole numbers"):
-        replace(passing(), present=np.array(rows))
-
-
 @pytest.mark.parametrize("step", [0.1, 0.7, 1.2, 2.0])
-def test_nobody_drives_over_who_has_just_gone_however_long_the_steps(step):
+def test_vanished_vehicle_is_not_driven_over(step):
     """A car stands and goes at the fifth instant; another one gets there within a second, between that instant and the next."""
     time = np.arange(11) * step
     gone = time[4]
@@ -129,7 +121,7 @@ def test_nobody_drives_over_who_has_just_gone_however_long_the_steps(step):
 
 @pytest.mark.parametrize("step", [0.1, 0.3, 0.7])
 @pytest.mark.parametrize("margin", [0.0, 0.6, 1.0])
-def test_the_margin_is_whole_at_every_instant(step, margin):
+def test_margin_is_whole_at_each_instant(step, margin):
     """However the sums are rounded: it reaches at least so far, and by less than a step more."""
     time = np.round(np.arange(101) * step, 9)
     for at in range(1, 99):
@@ -142,7 +134,7 @@ def test_the_margin_is_whole_at_every_instant(step, margin):
             assert min(margin, whole) - 1e-8 <= reached < margin + step - 1e-8
 
 
-def test_who_stands_does_not_turn_in_many_short_steps():
+def test_standing_vehicle_does_not_turn():
     """Half a turn on the spot in 32 ms, each step of it 0.1 mrad; a step of 0.1 s may show as much."""
     count = 32_000
     short = np.arange(count) * 1e-6
@@ -153,7 +145,7 @@ def test_who_stands_does_not_turn_in_many_short_steps():
 
 
 @pytest.mark.parametrize("far", [2.0 * LARGEST_VALUE_RATIO, 1e15, 1e300])
-def test_where_coordinates_are_too_coarse_nothing_is_proven(far):
+def test_coarse_coordinates_prove_nothing(far):
     time = np.array([0.0, 1.0, 2.0])
     crossing = scenario_of(
         [straight(far - 30, 0, 0, 40, time), straight(far, -30, np.pi / 2, 40, time)], time
@@ -164,7 +156,7 @@ def test_where_coordinates_are_too_coarse_nothing_is_proven(far):
 @pytest.mark.parametrize(
     "size", [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (5.0, np.nan), (np.inf, 1.0), (1e-12, 1e-12)]
 )
-def test_no_size_lets_two_stand_in_one_place(size):
+def test_no_size_permits_one_place(size):
     standing = [straight(0, 0, 0, 0.0, TIME)] * 2
     scenario = scenario_of(standing, TIME, (Vehicle("a", *size), Vehicle("b", *size)))
     if all(extent > 0.0 for extent in size):
@@ -174,7 +166,7 @@ def test_no_size_lets_two_stand_in_one_place(size):
             causes(scenario)
 
 
-def test_what_no_kernel_filled_in_is_refused(monkeypatch):
+def test_unfilled_results_are_refused(monkeypatch):
     monkeypatch.setattr(dynamics, "worst_excess", lambda *_: None)
     monkeypatch.setattr(containment, "first_exits", lambda *_: None)
     found = causes(passing(), road=open_road())

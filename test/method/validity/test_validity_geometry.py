@@ -41,7 +41,7 @@ def box_at(scenario, i, time):
 
 
 @pytest.mark.parametrize("offset", [0.0, 3.0, -4.0])
-def test_cars_that_cross_between_two_samples_overlap(offset):
+def test_cars_crossing_between_samples_overlap(offset):
     """At 40 m/s and one sample per second the cars are 20 m apart at every sample, and meet in between."""
     crossing = scenario_of(
         [straight(-60, 0, 0, 40, COARSE), straight(0, -60 + offset, np.pi / 2, 40, COARSE)], COARSE
@@ -64,7 +64,7 @@ def test_rotation_alone_can_touch():
     assert causes(scenario_of([turning, standing], time, trucks)) == [Cause.OVERLAP]
 
 
-def test_touching_is_overlap_and_a_millimetre_is_not():
+def test_touching_is_overlap():
     cars = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
     for gap, expected in (
         (0.0, [Cause.OVERLAP]),
@@ -96,24 +96,9 @@ def test_minimum_clearance_is_kept():
     assert causes(side, limits=Limits(min_clearance=0.99)) == []
 
 
-@pytest.mark.parametrize("resolution", [0.1, 0.2])
-def test_a_post_of_one_cell_between_two_samples_is_seen(resolution):
-    drivable = np.ones((int(10 / resolution), int(200 / resolution)), dtype=bool)
-    free = road_of(drivable, resolution)
-    drive = scenario_of([straight(20, 5, 0, 30, COARSE)], COARSE)
-    assert causes(drive, free) == []
-    drivable[drivable.shape[0] // 2, int(65 / resolution)] = False
-    assert causes(drive, road_of(drivable, resolution)) == [Cause.OFF_ROAD]
-    drivable[:] = True
-    drivable[int((5 + 0.96 + resolution) / resolution), int(65 / resolution)] = (
-        False  # just beside the car
-    )
-    assert causes(drive, road_of(drivable, resolution)) == []
-
-
 @pytest.mark.parametrize("yaw", [0.0, 0.5 * np.pi, 1.0])
 @pytest.mark.parametrize("ahead", [0.0, 1.0])
-def test_a_slide_in_any_direction_is_swept(yaw, ahead):
+def test_slide_in_any_direction_is_swept(yaw, ahead):
     """Limits aside the proof holds for any motion: 20 m aside, or ahead, between two samples at no speed."""
     turned = yaw + 0.5 * np.pi * (1.0 - ahead)
     way = np.array([np.cos(turned), np.sin(turned)])
@@ -129,23 +114,11 @@ def test_a_slide_in_any_direction_is_swept(yaw, ahead):
         assert causes(scenario, road_of(blocked, 0.25)) == [Cause.OFF_ROAD]
 
 
-def test_a_lane_as_wide_as_the_car_suffices_and_a_hair_less_does_not():
-    road = road_of(np.pad(np.ones((8, 400), dtype=bool), 2), 0.25)
-    fits = scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),))
-    assert causes(fits, road) == []
-    assert causes(
-        scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0 + 1e-6),)), road
-    ) == [Cause.OFF_ROAD]
-    assert causes(
-        scenario_of([straight(5, 1.5, 1e-3, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),)), road
-    ) == [Cause.OFF_ROAD]
-
-
 @pytest.mark.parametrize(
     ("quarters", "over"),
     [(0, 0.0), *itertools.product(range(4), (-2e-6, 1e-6))],  # multiples of π are no floats
 )
-def test_the_border_of_the_grid_is_road_and_beyond_it_is_none(quarters, over):
+def test_border_of_grid_is_road(quarters, over):
     """A car of 4 m by 2 m stands along each side of a road of 24 m by 20 m, cells of which end there."""
     road = road_of(np.ones((80, 96), dtype=bool), 0.25)
     x, y = (1.0, 2.0) if quarters % 2 else (2.0, 1.0)
@@ -160,17 +133,7 @@ def test_the_border_of_the_grid_is_road_and_beyond_it_is_none(quarters, over):
         assert found == ([Cause.OFF_ROAD] if over > 0.0 else []), place
 
 
-def test_outside_the_grid_is_off_road():
-    road = road_of(np.ones((100, 100), dtype=bool), 0.25)
-    for track in (
-        straight(5, 12, 0, 6, FINE),
-        straight(12, 3, -np.pi / 2, 1, FINE),
-        straight(-500, 9, 0.1, 0, FINE),
-    ):
-        assert causes(scenario_of([track], FINE), road) == [Cause.OFF_ROAD]
-
-
-def test_the_cubic_between_samples_counts_not_the_chord():
+def test_cubic_counts_not_the_chord():
     """Both samples of a wide swerve lie on a straight corridor; the motion between them leaves it."""
     time = np.array([0.0, 4.0])
     road = road_of(np.pad(np.ones((16, 300), dtype=bool), 40), 0.25)
@@ -238,13 +201,13 @@ def compare(seed):
     return answer.valid
 
 
-def test_checker_and_oracle_agree_on_random_scenarios_of_both_kinds():
+def test_random_scenarios_agree_with_the_oracle():
     assert 6 <= sum(map(compare, range(60))) <= 54
 
 
 @settings(max_examples=1000 if LONG else 60)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
+def test_standing_footprint_equals_its_cells(seed):
     rng = np.random.default_rng(seed)
     road = road_of(rng.random((30, 30)) > 0.02, 0.5, rng.uniform(-5, 5, 2))
     car = Vehicle("a", *rng.uniform(0.3, 5.0, 2))
@@ -259,27 +222,6 @@ def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
         assert not area.covers(larger)
     else:
         assert area.covers(smaller)
-
-
-def test_one_blocked_cell_under_or_beside_a_footprint_decides():
-    """A truck stands askew on open ground; the cell lies anywhere below it, or up to 1 m beside it."""
-    rng, seen = np.random.default_rng(5), set()
-    for _ in range(600 if LONG else 120):
-        truck = Vehicle("a", *rng.uniform((6.0, 1.0), (14.0, 2.5)))
-        track = straight(*rng.uniform(-0.1, 0.1, 2), rng.uniform(-np.pi, np.pi), 0.0, COARSE)
-        box = footprints(track[0][:1], track[1][:1], truck.length, truck.width)[0]
-        x, y = rng.uniform(-8.0, 8.0, 2)
-        if shapely.distance(box, shapely.Point(x, y)) > 1.0:
-            continue
-        cells = np.ones((200, 200), dtype=bool)
-        row, column = int((y + 10.0) / 0.1), int((x + 10.0) / 0.1)
-        cells[row, column] = False
-        corner = np.array([column, row]) * 0.1 - 10.0
-        gap = shapely.distance(box, shapely.box(*corner, *(corner + 0.1)))
-        found = causes(scenario_of([track], COARSE, (truck,)), road_of(cells, 0.1, (-10.0, -10.0)))
-        assert found == ([] if gap > 1e-6 else [Cause.OFF_ROAD])
-        seen.add(gap > 1e-6)
-    assert len(seen) == 2
 
 
 WALL = road_of(np.pad(np.ones((200, 200), dtype=bool), 10), 0.2, (-22.0, -22.0))  # at ±20 m
@@ -309,7 +251,7 @@ def beside_the_wall(rng, over):
     return placed(np.array(shifts[rng.integers(4)]))
 
 
-def test_a_footprint_that_turns_beside_a_wall_is_proven_exactly():
+def test_footprint_turning_at_wall_is_exact():
     rng = np.random.default_rng(0)
     for over in 10.0 ** rng.uniform(-6.0, -2.0, 3000 if LONG else 400):
         assert causes(beside_the_wall(rng, over), WALL) == [Cause.OFF_ROAD], over
@@ -318,7 +260,7 @@ def test_a_footprint_that_turns_beside_a_wall_is_proven_exactly():
 
 @settings(max_examples=100 if LONG else 10)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
+def test_grazing_arcs_agree_with_oracle(seed):
     """Arcs that graze each other: the pair is shifted until the smallest gap the oracle sees is a centimetre."""
     rng = np.random.default_rng(seed)
     time = np.arange(6) * rng.choice([0.1, 0.5, 1.0])

@@ -60,7 +60,7 @@ def causes(scenario, **known):
         ([[0, 10], [80, 100]], False, False),  # never together
     ],
 )
-def test_footprints_overlap_while_both_are_there_and_a_little_longer(present, shown, beyond):
+def test_footprints_overlap_within_the_margin(present, shown, beyond):
     for margin, meets in ((0.0, shown), (1.0, beyond)):
         found, verdict = causes(together(present), limits=replace(FREE, presence_margin=margin))
         assert found == ([Cause.OVERLAP] if meets else [])
@@ -74,13 +74,13 @@ def test_footprints_overlap_while_both_are_there_and_a_little_longer(present, sh
 
 
 @pytest.mark.parametrize(("comes", "valid"), [(42, False), (55, False), (60, False), (62, True)])
-def test_nobody_stands_where_another_one_has_just_vanished(comes, valid):
+def test_vanished_place_stays_blocked(comes, valid):
     scenario = scenario_of([straight(0, 0, 0, 0.0, TIME), straight(1, 0, 0.2, 0.0, TIME)], TIME)
     found, _ = causes(replace(scenario, present=np.array([[0, 40], [comes, 100]])))
     assert found == ([] if valid else [Cause.OVERLAP])
 
 
-def test_a_pair_that_nothing_looks_at_is_refused(monkeypatch):
+def test_uncompared_pair_is_refused(monkeypatch):
     monkeypatch.setattr(collision, "first_contacts", lambda *_: None)
     for present in ([[0, 100], [0, 100]], [[0, 60], [40, 100]], [[0, 50], [50, 100]]):
         found, verdict = causes(together(present))
@@ -134,7 +134,7 @@ def compare(seed, group=0):
     return not refused, spans
 
 
-def test_checker_and_oracle_agree_on_who_comes_and_goes():
+def test_changing_presence_agrees_with_the_oracle():
     found = [compare(seed) for seed in range(40)]
     assert 5 <= sum(valid for valid, _ in found) <= 35
     assert set().union(*(spans for _, spans in found)) == {0, 1, 2, 3}
@@ -144,7 +144,7 @@ def test_checker_and_oracle_agree_on_who_comes_and_goes():
 
 @given(st.integers(0, 10_000))
 @settings(max_examples=20)
-def test_each_vehicle_is_checked_as_if_cut_out(seed):
+def test_each_vehicle_is_checked_alone(seed):
     """Road and dynamics of every vehicle are those of a scenario of its own."""
     rng = np.random.Generator(np.random.PCG64(seed))
     tracks = [wander(rng, TIME, 25.0) for _ in range(3)]
@@ -170,7 +170,7 @@ def test_each_vehicle_is_checked_as_if_cut_out(seed):
     assert sorted(cause for cause in found if cause != Cause.OVERLAP) == sorted(expected)
 
 
-def test_states_are_asked_of_a_vehicle_s_own_first_and_last_instant():
+def test_states_are_those_at_presence():
     scenario = together([[0, 39], [20, 100]])
     start = np.array([[-25, 0, 0, 5], [15, 0, np.pi, 5]], dtype=float)
     end = np.array([[-5.5, 0, 0, 5], [-25, 0, np.pi, 5]], dtype=float)
@@ -182,7 +182,7 @@ def test_states_are_asked_of_a_vehicle_s_own_first_and_last_instant():
     assert verdict.violations[0].time == 2.0
 
 
-def test_who_waits_from_its_arrival_on_to_its_end_stands_throughout():
+def test_waiting_from_arrival_stands_throughout():
     stands = straight(10, 30, 0, 0.0, TIME)
     scenario = replace(
         scenario_of([straight(-25, 0, 0, 5, TIME), stands], TIME),
@@ -200,7 +200,7 @@ def test_who_waits_from_its_arrival_on_to_its_end_stands_throughout():
     ] == [Cause.STOP_NOT_KEPT]
 
 
-def test_who_drives_against_its_lane_does_so_while_it_is_there():
+def test_wrong_way_counts_while_present():
     """A lane to the west, a car to the east that comes after 2 s and goes after 6 s."""
     x = np.array([40.0, -40.0])
     lane = Lane("west", *(np.column_stack((x, np.full(2, y))) for y in (-2.0, 2.0)))

@@ -59,7 +59,7 @@ CLEARS = Situation.of(TEMPLATE).reactions.edges[0].clears
         (9.0, False),
     ],
 )
-def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(lag, kept):
+def test_yielder_leaves_neither_early_nor_late(lag, kept):
     """It is seen to leave 0.25 s after its speed begins to rise."""
     own = Situation.of(TEMPLATE).reactions.edges[0].lag
     assert -0.1 < own < 2.0
@@ -72,7 +72,7 @@ def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(la
         ].message and "vehicle 1 has cleared" in found[0].message
 
 
-def test_the_bounds_of_a_lag_are_parameters():
+def test_lag_bounds_are_parameters():
     early = as_scenario(crossing(CLEARS - 1.2))
     assert refusals(early, TEMPLATE) != []
     assert refusals(early, TEMPLATE, Limits(anticipation=1.5)) == []
@@ -80,7 +80,7 @@ def test_the_bounds_of_a_lag_are_parameters():
     assert refusals(late, TEMPLATE, Limits(patience=9.0)) == []
 
 
-def test_a_yielder_that_no_longer_meets_the_other_does_not_yield():
+def test_yielder_without_meeting_does_not_yield():
     moved = TEMPLATE.position.copy()
     moved[0, :, 1] += 500.0
     (found,) = refusals(as_scenario(replace(TEMPLATE, position=moved)), TEMPLATE)
@@ -95,14 +95,14 @@ LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
     ("ahead", "kept"),
     [(0.0, True), (2.0, True), (5.0, False), (12.0, False), (-3.0, True), (-25.0, False)],
 )
-def test_a_follower_keeps_its_own_drivers_gaps(ahead, kept):
+def test_follower_keeps_its_drivers_gaps(ahead, kept):
     moved = LANE.position.copy()
     moved[1, :, 0] += ahead
     found = refusals(as_scenario(replace(LANE, position=moved)), LANE)
     assert (found == []) == kept
 
 
-def test_nobody_drives_nearer_than_half_a_second_even_without_a_reaction():
+def test_least_headway_is_always_kept():
     """A driver who in the template is far behind, at any speed of it."""
     far = lane_encounter(LEADER, LEADER, 75.0)
     assert Situation.of(far).reactions.edges == ()

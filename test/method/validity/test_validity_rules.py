@@ -28,7 +28,7 @@ def road_with(rules_kept=True):
 
 
 @pytest.mark.parametrize("start", [-25.0, -6.0])
-def test_who_runs_a_stop_line_is_refused_and_named(start):
+def test_stop_line_runner_is_named(start):
     found, verdict = causes(scenario_of([straight(start, 0, 0, 5, TIME)], TIME), road=road_with())
     assert found == [Cause.TRAFFIC_RULE]
     (violation,) = verdict.violations
@@ -37,11 +37,11 @@ def test_who_runs_a_stop_line_is_refused_and_named(start):
 
 
 @pytest.mark.parametrize("start", [2.0, -2.0])
-def test_who_is_beyond_the_line_from_the_start_runs_nothing(start):
+def test_start_beyond_line_runs_nothing(start):
     assert causes(scenario_of([straight(start, 0, 0, 3, TIME)], TIME), road=road_with())[0] == []
 
 
-def test_rules_that_are_ignored_are_not_checked_and_that_is_said():
+def test_ignored_rules_are_not_checked():
     road = road_with(rules_kept=False)
     assert causes(scenario_of([straight(-25, 0, 0, 5, TIME)], TIME), road=road)[0] == []
     said = Checker(road, None, None, None).not_applicable

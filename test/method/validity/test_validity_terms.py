@@ -87,7 +87,7 @@ def test_excesses_are_those_of_whole_arrays(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_speed_between_two_samples_is_above_the_one_that_is_compared(seed):
+def test_compared_speed_bounds_all_between(seed):
     rng = np.random.default_rng(seed)
     time = np.concatenate(([0.0], np.cumsum(rng.uniform(0.2, 2.0, 8))))
     position, heading, speed = wander(rng, time, 20.0)
@@ -102,7 +102,7 @@ def test_no_speed_between_two_samples_is_above_the_one_that_is_compared(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_least_gaps_are_those_of_brute_force(seed):
+def test_least_gaps_equal_brute_force(seed):
     """Recorded gaps count at speeds within 2 m/s; above 3 m/s a time gap is kept that the driver keeps."""
     rng = np.random.default_rng(seed)
     limits = Limits(floor_share=rng.uniform(0.3, 0.9), least_headway=rng.uniform(0.2, 1.0))
@@ -120,7 +120,7 @@ def test_least_gaps_are_those_of_brute_force(seed):
     np.testing.assert_allclose(least_gaps(speed, recorded, gap, limits), expected)
 
 
-def test_a_time_gap_exactly_at_its_limit_counts_as_kept():
+def test_time_gap_at_limit_is_kept():
     """Whatever the division rounds to: 0.3 s at speeds that no float holds."""
     limits = Limits(least_headway=0.3, floor_share=0.1)
     for speed in np.arange(3.1, 15.0, 0.1):
@@ -134,7 +134,7 @@ def test_a_time_gap_exactly_at_its_limit_counts_as_kept():
     ("gap", "low", "high"),
     [(3.0, 0.1, 5.4 + 3.0), (10.0, 1.5, 18.0 + 3.0), (0.4, 0.0, 0.72 + 3.0), (-0.3, -0.3, 3.0)],
 )
-def test_a_yielder_s_gap_is_allowed_to_differ_by_its_share(gap, low, high):
+def test_yielder_gap_differs_by_its_share(gap, low, high):
     edge = Reaction(YIELD, 1, 0, 0.0, 1.0, 0.6, 0.9, 0.0, 9.0, gap=gap)
     assert allowed_gap(edge, Limits()) == pytest.approx((low, high))
 
@@ -147,7 +147,7 @@ def verdict(scenario, requested=None, **known):
 
 @pytest.mark.parametrize(("end", "row"), [("start", [20, 100]), ("end", [0, 80])])
 @pytest.mark.parametrize("off", [-1.0, 1.0])
-def test_who_comes_or_goes_between_samples_is_off_by_a_step_at_most(end, row, off):
+def test_arrival_between_samples_is_tolerated(end, row, off):
     """At 5 m/s and 0.5 m/s² a step of 0.1 s is 0.5 m and 0.05 m/s; the tolerances come on top."""
     position, heading, _ = straight(-25.0, 0.0, 0.0, 5.0, TIME)
     track = position, heading, 5.0 + 0.5 * (TIME - TIME[row[end == "end"]])
@@ -165,7 +165,7 @@ def test_who_comes_or_goes_between_samples_is_off_by_a_step_at_most(end, row, of
 
 
 @pytest.mark.parametrize("first", range(20, 60, 3))
-def test_a_stand_of_exactly_a_second_is_one(first):
+def test_stand_of_a_second_is_one(first):
     """Between samples of which differences are no whole seconds."""
     stands = np.zeros(len(TIME), dtype=bool)
     stands[first : first + 11] = True
@@ -180,7 +180,7 @@ def test_a_stand_of_exactly_a_second_is_one(first):
 
 
 @pytest.mark.parametrize("column", [0, 3])
-def test_a_state_exactly_at_its_tolerance_is_the_requested_one(column):
+def test_state_at_its_tolerance_is_met(column):
     """0.1 m or 0.1 m/s off, by numbers that no float holds."""
     scenario = scenario_of([straight(0.7, 0.0, 0.0, 0.7, TIME)], TIME)
     states = np.array([[0.7, 0.0, 0.0, 0.7]]), np.array([[0.7 + 0.7 * 10.0, 0.0, 0.0, 0.7]])
@@ -192,7 +192,7 @@ def test_a_state_exactly_at_its_tolerance_is_the_requested_one(column):
         assert verdict(scenario, BoundaryStates(start, states[1]), limits=limits) == fault
 
 
-def test_who_is_to_end_a_tolerance_away_waits_throughout():
+def test_stand_within_tolerance_is_throughout():
     """0.1 m by coordinates that no float holds; within it a vehicle may stand, but not twitch."""
     stands = straight(0.7, 0.0, 0.0, 0.0, TIME)
     twitch = np.where(TIME[50] == TIME, 0.4, 0.0)
@@ -205,7 +205,7 @@ def test_who_is_to_end_a_tolerance_away_waits_throughout():
 
 
 @pytest.mark.parametrize("offset", [-2.5, 2.5])
-def test_two_in_a_lane_keep_their_side_and_their_distance(offset):
+def test_two_in_a_lane_keep_apart(offset):
     pair = Abreast((0, 1), offset, 1.3, np.ones(3, dtype=bool), np.zeros((2, 2)))
     for change in (0.99, -0.99, 1.01, -1.01, -2.0 * abs(offset) / MAX_CLEARANCE_CHANGE_M):
         beside = offset + change * MAX_CLEARANCE_CHANGE_M * np.sign(offset)
@@ -215,7 +215,7 @@ def test_two_in_a_lane_keep_their_side_and_their_distance(offset):
 
 
 @pytest.mark.parametrize(("share", "longest"), [(1.0, 4.0), (0.5, 3.0)])
-def test_a_follower_falls_back_by_its_share_at_most(share, longest):
+def test_follower_falls_back_by_its_share(share, longest):
     """Its longest recorded time gap is 2 s."""
     edge = Reaction(FOLLOW, 1, 0, 1.0, 1.0, 1.0, 0.9, 0.0, 9.0, (1.0, 1.5, 2.0))
     limits = replace(FREE, headway_share=share)

@@ -36,7 +36,7 @@ def bytes_of(folder):
 
 
 @pytest.mark.parametrize("target", EXPORTS.built_in)
-def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
+def test_same_bag_gives_same_bytes(small_bag, tmp_path, target):
     for name in ("one", "two"):
         made = export_bag(small_bag, tmp_path / name, target)
         assert made.scenarios == 4
@@ -54,7 +54,7 @@ def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
         assert all((tmp_path / "one" / name).exists() for name in entry["files"])
 
 
-def test_a_chosen_one_with_an_ego_by_the_command(small_bag, tmp_path):
+def test_chosen_scenario_with_ego_is_exported(small_bag, tmp_path):
     out = tmp_path / "out"
     arguments = [
         "export",
@@ -84,14 +84,6 @@ def test_a_chosen_one_with_an_ego_by_the_command(small_bag, tmp_path):
     assert (entry["index"], entry["ego"], entry["vehicles"]) == (1, "2", ["1"])
 
 
-def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
-    everything = read_cases(small_bag)
-    for case in read_cases(small_bag, indices=[1]):
-        (same,) = [one for one in everything if one.number == case.number]
-        lanes = zip(case.lane_map.network.lanes, same.lane_map.network.lanes, strict=True)
-        assert all(np.array_equal(a.left, b.left) for a, b in lanes)
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -109,7 +101,7 @@ def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
         (["--to", "commonroad", "--set", "run_out=-1"], "run_out"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(small_bag, tmp_path, options, said):
+def test_impossible_exports_are_refused(small_bag, tmp_path, options, said):
     with pytest.raises(InputError) as error:
         CliRunner().invoke(
             app,
@@ -161,9 +153,7 @@ def geographic_town(tmp_path_factory):
         ("local", "", None),
     ],
 )
-def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(
-    geographic_town, tmp_path, projection, origin, zero
-):
+def test_map_in_degrees_keeps_its_frame(geographic_town, tmp_path, projection, origin, zero):
     path, bag = geographic_town
     config = ExportConfig(map=str(path), projection=projection, projection_origin=origin)
     made = export_bag(bag, tmp_path / "out", "openscenario", config)
@@ -193,36 +183,7 @@ def test_a_map_in_degrees_is_driven_in_the_frame_in_which_others_load_it(
         assert np.abs(np.sin(heading - np.arctan2(step[:, 1], step[:, 0])))[1:-1].max() < 5e-3
 
 
-def test_autoware_gets_the_frame_of_the_map_without_being_given_it(geographic_town, tmp_path):
-    _, bag = geographic_town
-    made = export_bag(bag, tmp_path / "out", "autoware")
-    assert (
-        "positions in the MGRS square at 200000 m east and 6600000 m north of UTM zone 32 north"
-        in made.notes[0]
-    )
-    scenario = read_cases(bag)[0].scenarios[0]
-    with Reader(tmp_path / "out" / f"case_1_{scenario.index}") as reader:
-        _, _, data = next(
-            reader.messages(
-                [c for c in reader.connections if c.topic.endswith("/tracking/objects")]
-            )
-        )
-    thing = (
-        type_store()
-        .deserialize_cdr(data, "autoware_perception_msgs/msg/TrackedObjects")
-        .objects[0]
-    )
-    place = thing.kinematics.pose_with_covariance.pose.position
-    latitude, longitude = pyproj.Transformer.from_crs(32632, 4326).transform(
-        place.x + 200_000.0, place.y + 6_600_000.0
-    )
-    first = geodetic(scenario.others.position[0, 0], ORIGIN)
-    assert np.allclose((latitude, longitude), first, atol=1e-8)
-    with pytest.raises(InputError, match="projection_origin: MGRS squares"):
-        export_bag(bag, tmp_path / "other", "autoware", ExportConfig(projection_origin="60, 5"))
-
-
-def test_scenarios_are_exported_on_the_map_of_the_user(town, tmp_path):
+def test_scenarios_are_exported_on_user_map(town, tmp_path):
     path, bag = town
     made = export_bag(bag, tmp_path / "out", "openscenario", ExportConfig(map=str(path)))
     assert made.scenarios == 2 and "the lanes of town.xodr" in made.notes[0]
@@ -235,7 +196,7 @@ def test_scenarios_are_exported_on_the_map_of_the_user(town, tmp_path):
 
 
 @pytest.mark.parametrize("target", ["commonroad", "openscenario", "scenarionet"])
-def test_a_grid_without_lanes_is_refused_where_lanes_are_needed(tmp_path, target):
+def test_export_refuses_grids_without_lanes(tmp_path, target):
     bag = write_recording(tmp_path / "bag", hand_made_run())
     with pytest.raises(RefusedError, match="left out: the road is a grid without lanes"):
         export_bag(bag, tmp_path / "out", target)

@@ -34,7 +34,7 @@ def lanes_on(name, config, run_out=1.0):
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way", "merge", "roundabout"])
-def test_true_lanes_lie_on_the_road_and_fill_its_arms(name, side):
+def test_true_lanes_fill_the_road(name, side):
     road, lane_map = lanes_on(name, RoadConfig(lanes=2, traffic_side=side), 0.0)
     lanes = lane_map.network.lanes
     rows, columns = np.nonzero(road.drivable)
@@ -52,7 +52,7 @@ def test_true_lanes_lie_on_the_road_and_fill_its_arms(name, side):
 
 @pytest.mark.parametrize("name", ["t_intersection", "four_way", "merge", "roundabout"])
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
+def test_lanes_lead_from_entries_to_exits(name, side):
     road, lane_map = lanes_on(name, RoadConfig(lanes=2, traffic_side=side))
     lanes = lane_map.network.lanes
     starts, ends = (
@@ -87,7 +87,7 @@ def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
         assert ax * by - ay * bx > 0.0  # left is left
 
 
-def test_a_vector_maps_own_lanes_are_written():
+def test_vector_map_lanes_are_written():
     config = RoadConfig()
     road = build_road("straight", None, config)
     y = float(road.entries[0, 1])
@@ -119,9 +119,7 @@ def written(tmp_path, lane_map, ending):
 
 @pytest.mark.parametrize("ending", ["xodr", "xml"])
 @pytest.mark.parametrize(("name", "side"), [("straight", "left"), ("four_way", "right")])
-def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(
-    tmp_path, name, side, ending
-):
+def test_cycle_lanes_and_crossings_are_reread(tmp_path, name, side, ending):
     config = RoadConfig(cycle_lane=1.8, crossing="zebra", traffic_side=side)
     road, lane_map = lanes_on(name, config)
     again = written(tmp_path, lane_map, ending)
@@ -138,24 +136,6 @@ def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(
             len(lane.successors) for lane in read
         )
     assert len(again.lanes) == len(road.lanes.lanes) and again.traffic_side == side
-
-
-@pytest.mark.parametrize("ending", ["xodr", "xml"])
-@pytest.mark.parametrize("users", ["bus", "car,van,truck,bus,motorcycle", "pedestrian", "bicycle"])
-def test_users_of_the_lanes_of_a_map_are_read_again(tmp_path, users, ending):
-    line = np.array([[0.0, 0.0], [40.0, 0.0]])
-    lanes = [
-        VectorLane("a", line, line - (0.0, 3.0)),
-        VectorLane("b", line - (0.0, 3.0), line - (0.0, 6.0)),
-    ]
-    network = LaneNetwork("m", ()).with_lanes(
-        [lanes[0], replace(lanes[1], users=frozenset(users.split(",")))]
-    )
-    again = written(tmp_path, LaneMap(network.whole, "m"), ending)
-    assert sorted(",".join(sorted(lane.users)) for lane in again.whole.lanes) == [
-        "",
-        ",".join(sorted(users.split(","))),
-    ]
 
 
 def test_scenarionet_names_cycle_lanes_and_crossings():

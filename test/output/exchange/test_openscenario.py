@@ -24,7 +24,7 @@ def written(scenario, ego=None, export=ExportConfig()):
     return data, ET.fromstring(data)
 
 
-def test_every_reference_leads_somewhere_and_no_condition_waits_for_an_edge():
+def test_references_lead_somewhere():
     _, root = written(crossing(present=[[0, 60], [9, 44]]), one_vehicle())
     header = root.find("FileHeader").attrib
     assert (header["revMajor"], header["revMinor"], header["date"]) == (
@@ -46,7 +46,7 @@ def test_every_reference_leads_somewhere_and_no_condition_waits_for_an_edge():
 
 
 @pytest.mark.parametrize("mode", ["position", "follow"])
-def test_vertices_are_the_rear_axle_in_absolute_time(mode):
+def test_vertices_are_the_rear_axle(mode):
     scenario = crossing()
     _, root = written(scenario, export=ExportConfig(following=mode))
     for n, follow in enumerate(root.iter("FollowTrajectoryAction")):
@@ -88,7 +88,7 @@ def test_vertices_are_the_rear_axle_in_absolute_time(mode):
     assert places == first  # everybody starts where its trajectory does
 
 
-def test_who_is_not_there_is_added_and_deleted():
+def test_arrivals_and_departures_are_written():
     scenario = crossing(present=[[0, 60], [9, 44]])
     _, root = written(scenario)
     assert [private.attrib["entityRef"] for private in root.iter("Private")] == ["vehicle_1"]
@@ -106,7 +106,7 @@ def test_who_is_not_there_is_added_and_deleted():
     assert root.find(".//EntityAction[@entityRef='vehicle_2']/DeleteEntityAction") is not None
 
 
-def test_the_ego_is_placed_and_has_a_goal_but_no_trajectory():
+def test_ego_has_goal_without_trajectory():
     ego = one_vehicle()
     _, root = written(crossing(), ego)
     assert {ref.attrib["entityRef"] for ref in root.iter("EntityRef")} == {
@@ -138,7 +138,7 @@ def along(geometry, s):
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
+def test_road_network_is_smooth(side):
     config = RoadConfig(lanes=2, traffic_side=side)
     lane_map = LaneMap.of(build_road("t_intersection", None, config), 15.0)
     data = write_opendrive(lane_map, "t", 0)
@@ -184,7 +184,7 @@ def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
     assert len(driving) == len(lane_map.network.lanes)
 
 
-def test_how_a_maps_lanes_are_joined_and_signed_comes_back(tmp_path):
+def test_map_lanes_are_joined_again(tmp_path):
     def lane(name, begin, end, after=(), junction=""):
         borders = [np.linspace(begin, end, 12) + np.array([0.0, aside]) for aside in (1.75, -1.75)]
         return Lane(name, *borders, after, speed_limit=10.0, junction=junction)

@@ -11,7 +11,7 @@ import pytest
 
 from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.export import export_bag
-from scenario_gen.output.exchange.scenarionet import DATASET, MAPPING_FILE, pickled, SUMMARY_FILE
+from scenario_gen.output.exchange.scenarionet import DATASET, pickled
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def described(folder):
     return {path.name: pickle.loads(path.read_bytes()) for path in sorted(folder.glob("sd_*.pkl"))}
 
 
-def test_each_scenario_has_what_the_description_asks(exported):
+def test_each_scenario_is_fully_described(exported):
     for whole in described(exported).values():
         assert {
             "tracks",
@@ -51,7 +51,7 @@ def test_each_scenario_has_what_the_description_asks(exported):
             assert set(lane["exit_lanes"]) | set(lane["entry_lanes"]) <= set(whole["map_features"])
 
 
-def test_the_motion_is_that_of_the_bag(small_bag, exported):
+def test_motion_is_that_of_bag(small_bag, exported):
     wholes = described(exported)
     for case in read_cases(small_bag):
         for one in case.scenarios:
@@ -65,18 +65,6 @@ def test_the_motion_is_that_of_the_bag(small_bag, exported):
                 for n in range(len(one.others.vehicles))
             ]
             np.testing.assert_allclose(ends[: len(starts)], starts, atol=1e-4)
-
-
-def test_the_folder_is_a_data_set(exported):
-    names = sorted(described(exported))
-    summary, mapping = (
-        pickle.loads((exported / name).read_bytes()) for name in (SUMMARY_FILE, MAPPING_FILE)
-    )
-    assert sorted(summary) == sorted(mapping) == names
-    assert all(
-        entry["number_summary"]["num_objects"] == len(entry["object_summary"])
-        for entry in summary.values()
-    )
 
 
 def test_a_pickle_names_nothing_but_arrays(exported):

@@ -48,7 +48,7 @@ def test_opendrive(case):
     np.testing.assert_allclose(read, PLACES, atol=1e-6)
 
 
-def test_commonroad_is_read_again_as_a_road(case, tmp_path):
+def test_commonroad_is_read_as_a_road(case, tmp_path):
     path = tmp_path / "one.xml"
     path.write_bytes(write_commonroad(*case)[0])
     root = ET.parse(path).getroot()

@@ -38,7 +38,7 @@ def test_what_is_written_is_read_again(tmp_path):
         assert np.allclose(seen.fix[0], ALL.position[n, 0], atol=1e-6)
 
 
-def test_autoware_and_scenarionet_are_told_the_type():
+def test_exports_are_told_the_type():
     _, first = decoded(ALL)[TRACKS][0]
     labels = [entry.classification[0].label for entry in first.objects]
     assert labels == [1, 1, 2, 4, 3, 5, 6, 6, 7]

@@ -30,7 +30,7 @@ def run_on(*directions):
 
 
 @pytest.mark.parametrize(("directions", "wrong"), [((1, -1), 0), ((1, 1), 5), ((-1, -1), 5)])
-def test_a_wrong_way_driver_is_seen_in_a_bag(tmp_path, directions, wrong):
+def test_wrong_way_driver_is_seen(tmp_path, directions, wrong):
     run = run_on(*directions)
     bag = write_recording(tmp_path / "bag", run)
     (found,) = evaluate_bag(bag)
@@ -41,6 +41,6 @@ def test_a_wrong_way_driver_is_seen_in_a_bag(tmp_path, directions, wrong):
     ].speed_limit == 8.5
 
 
-def test_a_bag_of_a_grid_has_no_lanes(tmp_path):
+def test_grid_bag_has_no_lanes(tmp_path):
     bag = write_recording(tmp_path / "bag", hand_made_run())
     assert read_recording(bag).namespaces[""].road.lanes is None

@@ -50,7 +50,7 @@ def meet(tracks):
 
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.parametrize(("median", "start"), [(4.0, 12.0), (7.0, 15.5), (10.0, 18.0)])
-def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
+def test_left_turn_crosses_oncoming_lane(tmp_path, suffix, median, start):
     tracks = clean_tracks(left_turn(median, start))
     assert meet(tracks)
     graph = lane_graph(read_network(write(tmp_path, suffix)))
@@ -64,7 +64,7 @@ def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
 @pytest.mark.parametrize(
     "name", ["simple_4way_intersection", "fabriksgatan", "multi_intersections"]
 )
-def test_a_recorded_left_turn_crosses_the_oncoming_lane(data, name):
+def test_recorded_left_turn_crosses_oncoming_lane(data, name):
     """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
     log = next((data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])

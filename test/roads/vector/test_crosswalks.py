@@ -30,7 +30,7 @@ def crossing(more="", attributes='hdg="0"', kind="crosswalk"):
         (crossing(attributes='hdg="1.5707963267948966" length="8" width="4"'), 32.0),
     ],
 )
-def test_a_crosswalk_leads_from_the_right_of_its_road_to_the_left(tmp_path, objects, area):
+def test_crosswalk_leads_from_right_to_left(tmp_path, objects, area):
     network = read(tmp_path, road(section(right=lane(-1)), more=objects))
     (walk,) = network.others
     assert (walk.id, walk.crossing, sorted(walk.users)) == ("crosswalk 1.7", True, ["pedestrian"])
@@ -41,7 +41,7 @@ def test_a_crosswalk_leads_from_the_right_of_its_road_to_the_left(tmp_path, obje
     assert walk.left[0, 0] < walk.right[0, 0]
 
 
-def test_one_without_a_size_is_left_out_and_named(tmp_path):
+def test_crosswalk_without_size_is_named(tmp_path):
     network = read(
         tmp_path, road(section(right=lane(-1)), more=crossing(attributes='length="0" width="0"'))
     )

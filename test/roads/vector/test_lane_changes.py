@@ -63,7 +63,7 @@ def lanes_of(encounter, neighbours=True):
     return found.paths[0].lanes
 
 
-def test_a_change_must_gain_a_metre_and_a_half_squared():
+def test_change_must_gain_one_and_half():
     ends = np.arange(1.0, 3.5, 0.02)
     gains = np.array([gain(drifting(end)) for end in ends])
     worth = gains > GAIN_M2

@@ -49,7 +49,7 @@ def side_distance(encounter: Encounter) -> float:
     return float(np.nanmedian(np.abs(offsets[np.abs(offsets) < 4.0])))
 
 
-def test_a_car_beside_a_bicycle_keeps_its_distance(tmp_path) -> None:
+def test_car_beside_bicycle_keeps_distance(tmp_path) -> None:
     encounter = right_hook()
     (abreast,) = abreast_in_lane(clean_tracks(encounter))
     assert abreast.offset == pytest.approx(-2.55, abs=0.1)
@@ -68,7 +68,7 @@ def test_a_car_beside_a_bicycle_keeps_its_distance(tmp_path) -> None:
         assert side_distance(made) == pytest.approx(2.55, abs=0.3)
 
 
-def test_scenarios_that_lose_the_distance_are_refused(tmp_path) -> None:
+def test_scenarios_losing_side_distance_are_refused(tmp_path) -> None:
     encounter = right_hook()
     result = generate(encounter, "four_way", count=2, seed=1)
     assert not [loss for loss in result.fit.losses if loss.kind != "arm"]
@@ -86,7 +86,7 @@ def test_scenarios_that_lose_the_distance_are_refused(tmp_path) -> None:
         assert Cause.SIDE_CLEARANCE in causes
 
 
-def test_a_lane_too_narrow_for_the_distance_is_refused(tmp_path) -> None:
+def test_narrow_lane_for_distance_is_refused(tmp_path) -> None:
     encounter = right_hook(2.95)
     car, bicycle = encounter.vehicles
     encounter = replace(encounter, vehicles=(replace(car, width=2.5), bicycle))

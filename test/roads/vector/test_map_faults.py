@@ -30,7 +30,7 @@ def test_static_obstacles_of_commonroad_block_cells(tmp_path) -> None:
     assert NoteKind.MAP_OBSTACLES in {note.kind for note in road.lanes.notes}
 
 
-def test_a_polygon_blocks_the_smallest_rectangle_around_it(tmp_path) -> None:
+def test_polygon_blocks_its_bounding_rectangle(tmp_path) -> None:
     corners = [(-1.0, -0.5), (1.0, -0.5), (1.0, 1.5), (-1.0, 1.5)]
     points = "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x, y in corners)
     begin, end = OBSTACLE.index("<rectangle>"), OBSTACLE.index("</shape>")
@@ -44,7 +44,7 @@ def test_a_polygon_blocks_the_smallest_rectangle_around_it(tmp_path) -> None:
     assert any("its polygon has no area" in str(note) for note in road.lanes.notes)
 
 
-def test_a_spiral_of_a_centimetre_and_a_missing_header_do_not_matter(tmp_path) -> None:
+def test_tiny_spiral_and_missing_header_pass(tmp_path) -> None:
     text = opendrive()
     begin, end = text.index("<header"), text.index("<road")
     wild = text.replace("</planView>", ARTEFACT, 1)
@@ -55,7 +55,7 @@ def test_a_spiral_of_a_centimetre_and_a_missing_header_do_not_matter(tmp_path) -
         assert NoteKind.FAULTY not in {note.kind for note in road.lanes.notes}
 
 
-def test_a_lane_beyond_a_missing_one_costs_only_itself(tmp_path) -> None:
+def test_lane_beyond_missing_costs_only_itself(tmp_path) -> None:
     beyond = '<lane id="-3" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
     text = opendrive().replace("</right>", f"{beyond}</right>", 1)
     whole = build_road(str(write(tmp_path, ".xodr")))
@@ -70,7 +70,7 @@ def test_a_lane_beyond_a_missing_one_costs_only_itself(tmp_path) -> None:
     assert "it has neither width nor border" in str(note)
 
 
-def test_lanes_that_are_too_narrow_or_too_few_are_named(tmp_path) -> None:
+def test_narrow_or_too_few_lanes_named(tmp_path) -> None:
     speed = np.full(60, 8.0)
     narrow = write(tmp_path, ".xodr", opendrive().replace('a="3.5"', 'a="1.2"'))
     with pytest.raises(RefusedError, match=r"lane .* is 1\.2 m wide at .* too narrow for vehicle"):

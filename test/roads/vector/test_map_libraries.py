@@ -117,7 +117,7 @@ def lanelet2_map(map_file):
 
 
 @lanelet2_maps
-def test_lanes_for_cars_their_order_and_limits_are_those_of_the_routing_graph(lanelet2_map):
+def test_lanes_are_those_of_routing_graph(lanelet2_map):
     network, _, cars, graph, rules = lanelet2_map
     own = {lane.id: lane for lane in network.lanes if lane.id in cars}
     assert set(own) == set(cars)
@@ -140,7 +140,7 @@ def test_lanes_for_cars_their_order_and_limits_are_those_of_the_routing_graph(la
 
 
 @lanelet2_maps
-def test_the_grid_is_that_of_the_library_s_polygons(lanelet2_map):
+def test_grid_is_that_of_library_polygons(lanelet2_map):
     network, _, cars, _, _ = lanelet2_map
     tagged = all("local_x" in point.attributes for one in cars.values() for point in one.leftBound)
 
@@ -172,7 +172,7 @@ OPENDRIVE = (
     ["crossroads.xodr", *recorded(*(f"opendrive/{name}.xodr" for name in OPENDRIVE))],
     indirect=True,
 )
-def test_the_grid_is_that_of_pyxodr_s_lanes(map_file):
+def test_grid_is_that_of_pyxodr_lanes(map_file):
     network_module = pytest.importorskip(
         "pyxodr.road_objects.network", reason="pyxodr is not installed"
     )
@@ -201,7 +201,7 @@ COMMONROAD = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
     ["crossroads.xml", *recorded(*(f"commonroad/{name}.xml" for name in COMMONROAD))],
     indirect=True,
 )
-def test_the_grid_is_that_of_commonroad_s_lanelets(map_file):
+def test_grid_is_that_of_commonroad_lanelets(map_file):
     """Their bounds, read by the standard library's parser."""
     from xml.etree import ElementTree
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from support.map_builders import FORMATS, lanelet2, write
+from support.map_builders import lanelet2, write
 from test_crossings import meet
 from test_rules import crossing, template
 
@@ -111,7 +111,7 @@ STEPS = {  # sections of a road on which one lane, y = -1.75, goes straight on, 
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_a_record_that_begins_where_a_section_ends_is_the_next_ones(tmp_path, kind):
+def test_record_at_section_end_begins_next(tmp_path, kind):
     sections, offset = STEPS[kind]
     network = read(tmp_path, road("".join(sections), offsets=offset))
     assert all(np.allclose(lane.centre[:, 1], -1.75) for lane in network.lanes)
@@ -119,7 +119,7 @@ def test_a_record_that_begins_where_a_section_ends_is_the_next_ones(tmp_path, ki
     assert NoteKind.LINKS_LEFT_OUT not in {note.kind for note in network.notes}
 
 
-def test_a_section_for_one_side_leaves_the_other_as_it_is(tmp_path):
+def test_one_sided_section_spares_other_side(tmp_path):
     one = 'singleSide="true"'
     sections = section(left=lane(1), right=lane(-1, links='<successor id="-1"/>')) + section(
         50, right=lane(-1, links='<predecessor id="-1"/>') + lane(-2), attributes=one
@@ -131,7 +131,7 @@ def test_a_section_for_one_side_leaves_the_other_as_it_is(tmp_path):
     assert after(network)["1.0.-1"] == ["1.1.-1"]
 
 
-def test_a_road_without_length_joins_those_beside_it(tmp_path):
+def test_road_without_length_joins_neighbours(tmp_path):
     def between(before, next_one):
         ends = (("predecessor", before, "end"), ("successor", next_one, "start"))
         return "".join(
@@ -149,27 +149,7 @@ def test_a_road_without_length_joins_those_beside_it(tmp_path):
     assert after(network) == {"1.0.-1": ["2.0.-1"], "2.0.-1": ["3.0.-1"], "3.0.-1": []}
 
 
-@pytest.mark.parametrize(
-    ("access", "open_to_cars"),
-    [
-        ('<access rule="deny" restriction="passengerCar"/>', False),
-        ('<access rule="allow" restriction="bus"/>', False),
-        ('<access rule="deny"><restriction type="passengerCar"/></access>', False),
-        ('<access rule="deny" restriction="truck"/>', True),
-        ('<access rule="deny" restriction="none"/>', True),
-        (
-            '<access rule="allow" restriction="bus"/><access rule="allow" restriction="passengerCar"/>',
-            True,
-        ),
-    ],
-)
-def test_access_says_whether_cars_may_use_a_lane(tmp_path, access, open_to_cars):
-    network = read(tmp_path, road(section(right=lane(-1) + lane(-2, more=access))))
-    assert set(by_id(network)) == {"1.0.-1", "1.0.-2"} - (set() if open_to_cars else {"1.0.-2"})
-    assert open_to_cars != any(note.kind is NoteKind.OTHER_LANES for note in network.notes)
-
-
-def test_a_lane_says_in_which_directions_it_is_driven(tmp_path):
+def test_lane_directions_are_read(tmp_path):
     lanes = lane(-1, attributes='direction="both"') + lane(-2, attributes='direction="reversed"')
     east = {
         name: float(np.cos(one.yaw[0]))
@@ -190,7 +170,7 @@ def test_a_lane_says_in_which_directions_it_is_driven(tmp_path):
         ('type="solid"', "right", False, False),
     ],
 )
-def test_a_mark_may_be_crossed_one_way_only(tmp_path, mark, side, outwards, inwards):
+def test_mark_may_be_crossed_one_way(tmp_path, mark, side, outwards, inwards):
     sign = 1 if side == "left" else -1
     lanes = lane(sign, more=f'<roadMark sOffset="0" {mark}/>') + lane(2 * sign)
     found = by_id(read(tmp_path, road(section(**{side: lanes}))))
@@ -203,7 +183,7 @@ def test_a_mark_may_be_crossed_one_way_only(tmp_path, mark, side, outwards, inwa
 @pytest.mark.parametrize(
     ("factor", "more"), [(100.0, ""), (1.0, ""), (100.0, 'pRange="normalized"')]
 )
-def test_a_cubic_without_a_range_is_read_as_long_as_it_is_said_to_be(tmp_path, factor, more):
+def test_cubic_without_range_has_stated_length(tmp_path, factor, more):
     shape = f'<paramPoly3 aU="0" bU="{factor}" cU="0" dU="0" aV="0" bV="0" cV="{20.0 * (factor / 100.0) ** 2}" dV="0" {more}/>'
     network = read(
         tmp_path, road(section(right=lane(-1)), plan=LINE.replace("<line/>", shape), length=100)
@@ -224,11 +204,11 @@ def test_a_cubic_without_a_range_is_read_as_long_as_it_is_said_to_be(tmp_path, f
         (("r1", "", ""), RuleKind.GIVE_WAY),
     ],
 )
-def test_a_sign_is_read_by_its_country(sign, kind):
+def test_sign_is_read_by_its_country(sign, kind):
     assert kind_of_sign(*sign) == kind
 
 
-def test_a_stop_line_may_have_a_name_alone(tmp_path):
+def test_stop_line_may_have_only_name(tmp_path):
     signal = '<signal s="{}" t="-4" id="{}" name="{}" dynamic="no" orientation="+" country="{}" type="{}" subtype="{}"/>'
     signals = signal.format(90, "stop", "", "US", "R1", "1") + signal.format(
         88, "line", "StopLine", "", "-1", "-1"
@@ -240,32 +220,13 @@ def test_a_stop_line_may_have_a_name_alone(tmp_path):
     assert NoteKind.UNREAD_SIGNS not in {note.kind for note in network.notes}
 
 
-def test_a_marked_stop_line_of_autoware_is_one_to_stop_at(tmp_path):
+def test_autoware_stop_line_is_a_rule(tmp_path):
     text = lanelet2(signs={"s": "205"}).replace(
         'v="traffic_sign"/></relation>', 'v="road_marking"/></relation>'
     )
     text = text.replace('v="traffic_sign"/><tag k="subtype" v="de205"/>', 'v="stop_line"/>')
     (rule,) = read_network(write(tmp_path, ".osm", text)).rules
     assert rule.kind == RuleKind.STOP and np.allclose(rule.line[0], (3.5, -8.0))
-
-
-def test_users_of_a_lanelet_of_commonroad_say_whether_it_is_for_cars(tmp_path):
-    text, users = (
-        FORMATS[".xml"](),
-        ("<userOneWay>bicycle</userOneWay>", "<userBidirectional>vehicle</userBidirectional>"),
-    )
-    first, second = (
-        text.index("<laneletType>", text.index(f'<lanelet id="{k}"')) for k in (100, 101)
-    )
-    network = read_network(
-        write(
-            tmp_path,
-            ".xml",
-            f"{text[:first]}{users[0]}{text[first:second]}{users[1]}{text[second:]}",
-        )
-    )
-    assert {"101", "101r", "102"} <= set(by_id(network)) and "100" not in by_id(network)
-    assert np.allclose(by_id(network)["101r"].centre, by_id(network)["101"].centre[::-1])
 
 
 def bridge(folder, suffix, height):
@@ -302,7 +263,7 @@ def bridge(folder, suffix, height):
 
 
 @pytest.mark.parametrize("suffix", [".xodr", ".osm"])
-def test_who_drives_on_a_bridge_meets_nobody_under_it(tmp_path, suffix):
+def test_bridge_traffic_meets_nobody_below(tmp_path, suffix):
     flat, above = (bridge(tmp_path, suffix, height) for height in (1.0, 8.0))
     assert {lane.junction for lane in flat.lanes} == {"1"} and {
         lane.junction for lane in above.lanes
@@ -315,7 +276,7 @@ def test_who_drives_on_a_bridge_meets_nobody_under_it(tmp_path, suffix):
         next(find_places(lane_graph(above), tracks))
 
 
-def test_a_map_on_the_180th_meridian_is_one_map(tmp_path):
+def test_map_on_180th_meridian_is_whole(tmp_path):
     def place(x, y):
         latitude, longitude = geodesy.geodetic(np.array([x, y]), (-17.0, 180.0))
         return f'lat="{float(latitude)!r}" lon="{float(longitude)!r}">'
@@ -324,9 +285,7 @@ def test_a_map_on_the_180th_meridian_is_one_map(tmp_path):
     assert np.allclose(network.box, [[-60.0, -60.0], [60.0, 60.0]], atol=0.02)
 
 
-def test_places_beyond_the_shortlist_are_looked_at_where_nobody_takes_those_on_it(
-    tmp_path, monkeypatch
-):
+def test_places_beyond_shortlist_are_tried(tmp_path, monkeypatch):
     network, tracks = read_network(write(tmp_path, ".xodr")), clean_tracks(template(crossing()))
 
     def lanes():

@@ -71,7 +71,7 @@ def arm_of(point):
 
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.parametrize("sign", KINDS)
-def test_a_sign_concerns_its_lane_and_who_goes_first_are_the_others(tmp_path, suffix, sign):
+def test_sign_has_its_lane_and_priority(tmp_path, suffix, sign):
     network = network_with(tmp_path, suffix, {"s": sign})
     (rule,) = network.rules
     assert rule.kind == KINDS[sign]
@@ -86,14 +86,14 @@ def test_a_sign_concerns_its_lane_and_who_goes_first_are_the_others(tmp_path, su
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_map_without_signs_has_no_rules(tmp_path, suffix):
+def test_map_without_signs_has_no_rules(tmp_path, suffix):
     network = read_network(write(tmp_path, suffix))
     assert network.rules == () and not RuleCheck(network).rules
 
 
 @pytest.mark.parametrize("sign", ["205", "206"])
 @pytest.mark.parametrize("arm", ARMS)
-def test_the_yielder_goes_where_one_has_to_yield(tmp_path, sign, arm):
+def test_yielder_goes_where_it_must_yield(tmp_path, sign, arm):
     network = network_with(tmp_path, ".xodr", {arm: sign})
     best = next(places(network, clean_tracks(template(crossing()))))
     yielder = best.paths[1]
@@ -102,7 +102,7 @@ def test_the_yielder_goes_where_one_has_to_yield(tmp_path, sign, arm):
     assert round(other.cost, 6) <= round(best.cost, 6)
 
 
-def test_rounding_does_not_choose_between_places_that_are_alike(tmp_path):
+def test_rounding_does_not_choose_places(tmp_path):
     """As another CPU would round: all four arms are alike, and the template lies on the edges of cells."""
     network, motion = network_with(tmp_path, ".xodr", {"s": "205"}), crossing()
     paths = []
@@ -121,13 +121,13 @@ def test_rounding_does_not_choose_between_places_that_are_alike(tmp_path):
     assert all(np.abs(np.subtract(other, paths[0])).max() < 1e-6 for other in paths[1:])
 
 
-def test_a_map_on_which_everybody_would_break_a_rule_is_refused_and_the_reason_names_it(tmp_path):
+def test_map_with_broken_rules_is_refused(tmp_path):
     network = network_with(tmp_path, ".xodr", dict.fromkeys(ARMS, "206"))
     with pytest.raises(RefusedError, match=r"crosses the stop line.*traffic_rules=ignored"):
         next(places(network, clean_tracks(template(crossing()))))
 
 
-def test_who_stops_at_the_line_runs_nothing(tmp_path):
+def test_stopping_at_the_line_runs_nothing(tmp_path):
     network = network_with(tmp_path, ".xodr", {"s": "206"})
     assert broken(network, crossing()) == []
     (breach,) = broken(network, crossing(stands=False))
@@ -135,7 +135,7 @@ def test_who_stops_at_the_line_runs_nothing(tmp_path):
     assert broken(replace(network, rules_kept=False), crossing(stands=False)) == []
 
 
-def test_who_goes_first_though_he_has_to_give_way_takes_the_right_of_way(tmp_path):
+def test_going_first_takes_right_of_way(tmp_path):
     network = network_with(tmp_path, ".xodr", {"w": "205"})
     for stands in (True, False):
         (breach,) = broken(network, crossing(stands=stands))
@@ -143,7 +143,7 @@ def test_who_goes_first_though_he_has_to_give_way_takes_the_right_of_way(tmp_pat
     assert broken(network_with(tmp_path, ".xodr", {"s": "205"}), crossing()) == []
 
 
-def test_who_goes_long_before_the_other_one_takes_nothing(tmp_path):
+def test_going_long_before_takes_nothing(tmp_path):
     network = network_with(tmp_path, ".xodr", {"w": "205"})
     motion = crossing(stands=False)
     late = replace(
@@ -154,7 +154,7 @@ def test_who_goes_long_before_the_other_one_takes_nothing(tmp_path):
     assert broken(network, late) == []
 
 
-def test_a_part_keeps_the_rules_of_its_lanes(tmp_path):
+def test_part_keeps_rules_of_its_lanes(tmp_path):
     from scenario_gen.roads import build_road
 
     path = write(tmp_path, ".xodr", FORMATS[".xodr"](signs={"s": "206", "n": "206"}))

@@ -40,7 +40,7 @@ def crossroads(request, tmp_path, monkeypatch):
     return str(path), request.param
 
 
-def test_a_template_is_mirrored_on_a_map_of_the_other_side(crossroads):
+def test_template_is_mirrored_on_other_side(crossroads):
     path, side = crossroads
     assert build_road(path).lanes.traffic_side == side
     for own, encounter in (("right", oncoming(1.0)), ("left", oncoming(-1.0))):

@@ -55,7 +55,7 @@ def users(network):
         ),
     ],
 )
-def test_subtypes_and_participants_of_lanelets_name_users(tmp_path, tags, own):
+def test_lanelet_tags_name_users(tmp_path, tags, own):
     text = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
     network = read_network(
         write(tmp_path, ".osm", lanelet2().replace('<tag k="subtype" v="road"/>', text, 1))
@@ -64,7 +64,7 @@ def test_subtypes_and_participants_of_lanelets_name_users(tmp_path, tags, own):
     assert ("2000" in [one.id for one in network.lanes]) == ("car" in own or not own)
 
 
-def test_ways_of_people_neither_move_a_map_nor_make_junctions(tmp_path):
+def test_ways_of_people_change_no_roads(tmp_path):
     def known(subtype):
         text = lanelet2().replace(
             '<tag k="subtype" v="road"/>', f'<tag k="subtype" v="{subtype}"/>', 1
@@ -172,7 +172,7 @@ def street(tmp_path, kind, access=""):
         ("car", "biking", "-3"),
     ],
 )
-def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, lanes, placed):
+def test_drivers_are_placed_on_permitted_lanes(tmp_path, kind, lanes, placed):
     encounter = beside(kind)
     built = build_road(street(tmp_path, lanes) + "#box=0,-12,100,2", encounter)
     tracks = clean_tracks(encounter)
@@ -187,7 +187,7 @@ def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, 
     assert (ground is built) == (placed == "-3")
 
 
-def test_an_obstacle_on_a_cycle_lane_is_in_the_way_of_bicycles(tmp_path):
+def test_obstacle_on_cycle_lane_blocks_bicycles(tmp_path):
     built = build_road(street(tmp_path, "biking"), None, RoadConfig(obstacles="50 -5.25 0 2 1"))
     assert not ground_for(built, Vehicle("b", 1.8, 0.65, "bicycle")).drivable_at(
         np.array([50.0, -5.25])
@@ -198,7 +198,7 @@ def test_an_obstacle_on_a_cycle_lane_is_in_the_way_of_bicycles(tmp_path):
     ).obstructed.any()
 
 
-def test_who_may_use_no_lane_is_refused(tmp_path):
+def test_user_without_lanes_is_refused(tmp_path):
     denied = '<access rule="deny" restriction="bicycle"/>'
     read(tmp_path, road(section(right=lane(-1, more=denied))))
     built = build_road(str(tmp_path / "crossroads.xodr"))

@@ -13,12 +13,10 @@ from support.map_builders import (
     ARM,
     at,
     FORMATS,
-    HALF,
     lanelet2,
     lanes,
     LIMIT,
     opendrive,
-    WIDTH,
     write,
 )
 
@@ -50,7 +48,7 @@ def wanted():
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_the_crossroads_is_read_with_its_lanes_what_follows_and_its_limits(tmp_path, suffix):
+def test_crossroads_has_lanes_links_and_limits(tmp_path, suffix):
     network = read_network(write(tmp_path, suffix))
     assert len(network.lanes) == 20 and len(network.entries) == len(network.exits) == 4
     known, key_of = middles(network), {}
@@ -67,30 +65,7 @@ def test_the_crossroads_is_read_with_its_lanes_what_follows_and_its_limits(tmp_p
         assert bool(lane.junction) == (not name.endswith(("_in", "_out"))), name
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_the_grid_is_free_in_the_lanes_and_nowhere_else(tmp_path, suffix):
-    from shapely import contains_xy
-    from shapely.geometry import Polygon
-    from shapely.ops import unary_union
-
-    road = build_road(str(write(tmp_path, suffix)))
-    polygons = [Polygon([*left, *right[::-1]]) for left, right, _ in lanes().values()]
-    area = unary_union([polygon.buffer(1e-6) for polygon in polygons])
-    rows, columns = np.indices(road.drivable.shape)
-    x, y = (
-        road.origin[axis] + (index + 0.5) * road.resolution
-        for axis, index in ((0, columns), (1, rows))
-    )
-    sure, outside = area.buffer(-road.resolution), area.buffer(1.5 * road.resolution)
-    assert road.drivable[contains_xy(sure, x, y)].all()
-    assert not road.drivable[~contains_xy(outside, x, y)].any()
-    assert len(road.entries) == len(road.exits) == 4
-    for x, y, yaw in road.entries:
-        assert math.hypot(x, y) == pytest.approx(math.hypot(ARM, WIDTH / 2.0), abs=2e-3)
-        assert math.cos(yaw) * x + math.sin(yaw) * y < -HALF  # into the road
-
-
-def test_latitude_and_longitude_are_in_the_local_frame(tmp_path):
+def test_latitude_and_longitude_become_local_frame(tmp_path):
     def place(x, y):
         latitude, longitude = geodesy.geodetic(np.array([x, y]), (48.5, 9.25))
         return f'lat="{float(latitude)!r}" lon="{float(longitude)!r}">'
@@ -100,7 +75,7 @@ def test_latitude_and_longitude_are_in_the_local_frame(tmp_path):
     assert "48.5000000, 9.2500000" in str(network.notes[0])
 
 
-def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_path):
+def test_lanelet_for_both_directions_is_two(tmp_path):
     both = lanelet2(tags="").replace('<tag k="one_way" v="yes"/>', '<tag k="one_way" v="no"/>', 1)
     assert len(read_network(write(tmp_path, ".osm", both)).lanes) == 21
     walk = lanelet2().replace('<tag k="subtype" v="road"/>', '<tag k="subtype" v="walkway"/>', 1)
@@ -111,7 +86,7 @@ def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_
         read_network(write(tmp_path, ".osm", bus))
 
 
-def test_a_pose_is_along_a_lane_if_it_lies_in_one_about_its_way(tmp_path):
+def test_pose_in_a_lane_is_along(tmp_path):
     road = build_road(str(write(tmp_path, ".xodr")))
     x, y = at("w", -30.0, 1.75)
     poses = np.array(
@@ -122,7 +97,7 @@ def test_a_pose_is_along_a_lane_if_it_lies_in_one_about_its_way(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_part_is_cut_at_its_box(tmp_path, suffix):
+def test_part_is_cut_at_its_box(tmp_path, suffix):
     path = write(tmp_path, suffix)
     road = build_road(f"{path}#box=-30,-20,0,20")
     assert road.drivable.shape == (200, 150) and road.origin.tolist() == pytest.approx(
@@ -153,7 +128,7 @@ def test_a_part_is_cut_at_its_box(tmp_path, suffix):
         ("lane=3", "choose one of #lanelet=…, #junction=…, #box=…"),
     ],
 )
-def test_a_part_that_is_not_there_is_refused(tmp_path, part, said):
+def test_missing_part_is_refused(tmp_path, part, said):
     with pytest.raises(InputError, match=said):
         build_road(f"{write(tmp_path, '.xml')}#{part}")
 
@@ -161,12 +136,12 @@ def test_a_part_that_is_not_there_is_refused(tmp_path, part, said):
 @pytest.mark.parametrize(
     "name", ["t_intersection#box=0,0,9,9", "depot.yaml#junction=1", "a.osm#box=0,0,9,9#lanelet=1"]
 )
-def test_a_part_of_what_has_none_is_refused(name):
+def test_part_of_other_roads_is_refused(name):
     with pytest.raises(InputError, match="only a vector map has parts, one behind one #"):
         build_road(name)
 
 
-def test_a_map_too_large_to_draw_is_refused(tmp_path):
+def test_map_too_large_to_draw_refused(tmp_path):
     with pytest.raises(RefusedError, match=r"road\.max_cells"):
         build_road(str(write(tmp_path, ".xodr")), None, RoadConfig(max_cells=1000))
 
@@ -176,8 +151,6 @@ BOMB = (
 )
 BROKEN = [  # suffix, text, what is said, with its place
     (".osm", BOMB, "line 1: document types .* delete <!DOCTYPE"),
-    (".xodr", BOMB.replace("osm", "OpenDRIVE"), "document types"),
-    (".xml", '<!DOCTYPE a SYSTEM "file:///etc/passwd"><a/>', "document type"),
     (".osm", lanelet2()[:-40], r"line 1, column \d+: not XML"),
     (".osm", "<osm>" + "<a>" * 300 + "</a>" * 300 + "</osm>", "not XML .Excessive depth"),
     (".osm", "", "is empty"),
@@ -214,7 +187,6 @@ ODD = [  # one odd element: suffix, text, the note with its reason
         lanelet2().replace('role="left"', 'role="middle"', 1),
         "has 0 members with role left",
     ),
-    (".osm", lanelet2().replace('ref="1000"', 'ref="4000"'), "way 4000 is not in the map"),
     (".osm", lanelet2().replace('v="60.0"', 'v="nan"', 1), "is not a number"),
     (
         ".osm",
@@ -229,8 +201,6 @@ ODD = [  # one odd element: suffix, text, the note with its reason
         opendrive().replace('incomingRoad="0"', 'incomingRoad="99"', 1),
         "road '99' is not in the map",
     ),
-    (".xodr", opendrive().replace('length="52.0"', 'length="-1"'), "length -1"),
-    (".xodr", opendrive().replace('<lane id="1"', '<lane id="2"', 1), "missing"),
     (".xodr", opendrive().replace('<lane id="1"', '<lane id="one"', 1), "whole numbers above 0"),
     (
         ".xml",
@@ -243,13 +213,6 @@ ODD = [  # one odd element: suffix, text, the note with its reason
         r"line 1, <x>: 'west' is not a number",
     ),
     (".xml", FORMATS[".xml"]().replace("leftBound", "left", 2), "has no <leftBound>"),
-    (
-        ".osm",
-        lanelet2().replace(
-            "</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1
-        ),
-        r"1 faulty lanelet left out \(2000\), first: .*lanelet 2000 has 2 members with role left",
-    ),
     (
         ".xml",
         FORMATS[".xml"]().replace("8.333333333333334", "fast"),
@@ -264,7 +227,7 @@ ODD = [  # one odd element: suffix, text, the note with its reason
 
 
 @pytest.mark.parametrize(("suffix", "text", "said"), ODD, ids=range(len(ODD)))
-def test_one_odd_element_is_left_out_and_said(tmp_path, suffix, text, said):
+def test_odd_element_is_omitted_and_named(tmp_path, suffix, text, said):
     """As the formats' own libraries do, which open the rest."""
     (tmp_path / "odd").mkdir()
     whole, rest = (
@@ -277,7 +240,7 @@ def test_one_odd_element_is_left_out_and_said(tmp_path, suffix, text, said):
 
 
 @pytest.mark.parametrize("unit", ["kmh", " km/h", "KMH"])
-def test_a_speed_sign_may_have_a_unit(tmp_path, unit):
+def test_speed_sign_may_have_a_unit(tmp_path, unit):
     """As converters of data sets write them."""
     network = read_network(
         write(tmp_path, ".xml", FORMATS[".xml"]().replace("8.333333333333334", f"50{unit}"))
@@ -287,7 +250,7 @@ def test_a_speed_sign_may_have_a_unit(tmp_path, unit):
     )
 
 
-def test_what_is_asked_for_and_was_left_out_is_refused_with_the_reason(tmp_path):
+def test_requested_faulty_lanelet_is_refused(tmp_path):
     text = lanelet2().replace(
         "</relation>", '<member type="way" ref="1002" role="left"/></relation>', 1
     )
@@ -298,7 +261,7 @@ def test_what_is_asked_for_and_was_left_out_is_refused_with_the_reason(tmp_path)
 
 
 @pytest.mark.parametrize(("suffix", "text", "said"), BROKEN, ids=range(len(BROKEN)))
-def test_a_broken_map_is_refused_with_its_name_and_place(tmp_path, suffix, text, said):
+def test_broken_map_has_name_and_place(tmp_path, suffix, text, said):
     path = write(tmp_path, suffix, text)
     with pytest.raises(InputError, match=said) as error:
         build_road(str(path))
@@ -365,9 +328,7 @@ def across(count, length):
     ],
     ids=("lanes", "lanes", "lanes", "points", "points", "links", "crossings", "lengths"),
 )
-def test_what_would_take_too_much_time_or_memory_is_refused(
-    tmp_path, monkeypatch, suffix, text, limit, said
-):
+def test_oversized_maps_are_refused(tmp_path, monkeypatch, suffix, text, limit, said):
     if limit:
         monkeypatch.setattr(f"scenario_gen.roads.vector.{limit[0]}", limit[1])
     with pytest.raises(InputError, match=said) as error:
@@ -375,12 +336,12 @@ def test_what_would_take_too_much_time_or_memory_is_refused(
     assert "map" in str(error.value)
 
 
-def test_lanes_that_cross_are_one_junction_however_long_they_are(tmp_path):
+def test_crossing_lanes_are_one_junction(tmp_path):
     network = read_network(write(tmp_path, ".xml", across(3, 5000.0)))  # of 10,000 edges each
     assert [lane.junction for lane in network.lanes] == ["1", "1", "1"]
 
 
-def test_long_lanes_that_cross_above_each_other_take_little_memory():
+def test_long_crossing_lanes_take_little_memory():
     """As with one wrong coordinate; each pair of their points would be 1 TB."""
     along = np.linspace(-2e5, 2e5, 400_001)
 
@@ -396,16 +357,11 @@ def test_long_lanes_that_cross_above_each_other_take_little_memory():
     assert list(crossing_lanes(network)) == [(1, 2)]
 
 
-def test_a_whole_map_that_is_too_long_to_be_searched_is_refused(tmp_path, monkeypatch):
+def test_map_too_long_for_search_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("scenario_gen.roads.vector.lane_field._MAX_SECTIONS_COUNT", 100)
     (encounter,) = read_log([bundled("b")]).encounters
     with pytest.raises(RefusedError, match=r"choose a part with #box=x0,y0,x1,y1"):
         build_road(str(write(tmp_path, ".osm")), encounter)
-
-
-def test_a_missing_map_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.osm"):
-        build_road(str(tmp_path / "nowhere.osm"))
 
 
 SHAPES = {
