@@ -22,7 +22,7 @@ from scenario_gen.method.evaluation.law import (
     FEATURES,
     JOINT_FEATURES,
 )
-from scenario_gen.method.sampling.filters import Check
+from scenario_gen.method.sampling.filters import CheckScenarios
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Interval, Scenario, Verdict
@@ -166,7 +166,7 @@ def _speeds(
 
 
 def shifted(
-    encounter: Encounter, check: Check, rng: np.random.Generator, count: int
+    encounter: Encounter, check: CheckScenarios, rng: np.random.Generator, count: int
 ) -> list[Scenario]:
     """Return up to `count` of the records, moved in time and paced, that are valid."""
     draws = (_shifted_once(encounter, rng) for _ in range(MAX_DRAWS_RATIO * count))

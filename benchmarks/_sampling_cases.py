@@ -66,7 +66,7 @@ class Prepared:
     ) -> ScenarioSet:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
         checker = Checker(self.road, self.fit.requested, self.conflicts, self.waits)
-        check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]
+        check = checker.check if checked else lambda scenarios, *_: [Verdict() for _ in scenarios]
         plan = Plan(
             Situation.of(self.encounter),
             self.segmentation,

@@ -48,7 +48,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.filters import Check
+from scenario_gen.method.sampling.filters import CheckScenarios
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import road_and_template
@@ -117,7 +117,7 @@ def _shifted(
             print(f"{encounter.name}: {error}", file=sys.stderr)
 
 
-def _check(encounter: Encounter) -> Check:
+def _check(encounter: Encounter) -> CheckScenarios:
     """Return the check of shifted records, of which no states are requested.
 
     Raises:
@@ -135,8 +135,8 @@ def _check(encounter: Encounter) -> Check:
         reactions=situation.reactions.edges,
         lane_gaps=situation.lane_gaps,
     )
-    return lambda scenarios: checker.check(
-        [replace(scenario, frame_id=road.frame_id) for scenario in scenarios]
+    return lambda scenarios, *is_enough: checker.check(
+        [replace(scenario, frame_id=road.frame_id) for scenario in scenarios], *is_enough
     )
 
 

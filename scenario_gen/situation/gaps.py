@@ -152,33 +152,49 @@ def _fill_behind(
             is_straight = dx * cos + dy * sin > 0.0 and abs(dy * cos - dx * sin) < HALF_LANE_M
             out[k, t] = (
                 (is_straight and _is_alike(leader_yaw[t], yaw[t]))
-                or t - _sample_near(leader_path, leader_yaw, path[t], yaw[t], step, t) > step
-                or _sample_near(path, yaw, leader_path[t], leader_yaw[t], step, t) - t > step
+                or _nearest_in(leader_path, leader_yaw, path[t], yaw[t], step, 0, t - step)
+                or _nearest_in(
+                    path, yaw, leader_path[t], leader_yaw[t], step, t + step + 1, len(path)
+                )
             )
 
 
 @kernel(inline=True)
 def _is_alike(heading: float, other: float) -> bool:
     """Return whether two headings [rad] differ little."""
+    difference = abs(heading - other)
+    if difference < 5.0 and abs(difference - MAX_HEADING_DIFFERENCE_RAD) > 0.1:
+        return difference < MAX_HEADING_DIFFERENCE_RAD  # a remainder would take most of the time
     return abs((heading - other + np.pi) % (2.0 * np.pi) - np.pi) < MAX_HEADING_DIFFERENCE_RAD
 
 
 @kernel(inline=True)
-def _sample_near(
-    path: Floats, heading: Floats, place: Floats, yaw: float, step: int, default: int
-) -> int:
-    """Return the sample of a path (T, 2) that is nearest to a pose, if it is near.
+def _nearest_in(
+    path: Floats, heading: Floats, place: Floats, yaw: float, step: int, begin: int, end: int
+) -> bool:
+    """Return whether the sample of a path (T, 2) nearest to a pose is near, and in a range.
 
-    The path is compared at every `step`-th sample.
+    The path is compared at every `step`-th sample, and of equal distances the first one counts.
     """
-    least, nearest = np.inf, 0
-    for k in range(0, len(path), step):
-        dx, dy = path[k, 0] - place[0], path[k, 1] - place[1]
-        square = dx * dx + dy * dy
+    least, nearest = np.inf, -1
+    for k in range(-(-begin // step) * step, end, step):
+        square = _square(path[k], place)
         if square < least:
             least, nearest = square, k
-    is_near = np.sqrt(least) < HALF_LANE_M and _is_alike(heading[nearest], yaw)
-    return nearest if is_near else default
+    if np.sqrt(least) >= HALF_LANE_M or not _is_alike(heading[nearest], yaw):
+        return False
+    for k in range(0, len(path), step):
+        square = _square(path[k], place)
+        if square < least or (square == least and k < nearest):
+            return False
+    return True
+
+
+@kernel(inline=True)
+def _square(place: Floats, other: Floats) -> float:
+    """Return the squared distance [m²] of two places (2,)."""
+    dx, dy = place[0] - other[0], place[1] - other[1]
+    return float(dx * dx + dy * dy)
 
 
 def bumper_gaps(motion: Motion, follower: int, leader: int) -> Floats:

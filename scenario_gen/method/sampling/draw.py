@@ -17,7 +17,7 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.cross_entropy import find_proposal, STAGE_BLOCKS_COUNT
 from scenario_gen.method.sampling.filters import (
     Candidate,
-    Check,
+    CheckScenarios,
     Filters,
     MIN_RARITY_SCENARIOS,
     Pilot,
@@ -64,7 +64,7 @@ _ENOUGH_OF_ONE_DRIVER_SHARE = 0.3
 
 def draw_scenarios(
     plan: Plan,
-    check: Check,
+    check: CheckScenarios,
     config: SamplingConfig = SamplingConfig(),
     *,
     count: int,

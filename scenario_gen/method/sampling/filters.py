@@ -6,7 +6,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,9 +15,27 @@ from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS
 from scenario_gen.method.sampling.time_warp import MIN_RATE_RATIO, SAMPLE_PERIOD_S
 from scenario_gen.method.sampling.trimming import MIN_DURATION_S
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Cause, FOLLOW, Note, NoteKind, Reaction, Scenario, Verdict
+from scenario_gen.types import (
+    Cause,
+    FOLLOW,
+    Note,
+    NoteKind,
+    Reaction,
+    Scenario,
+    Verdict,
+    Violation,
+)
 
-Check = Callable[[Sequence[Scenario]], list[Verdict]]
+
+class CheckScenarios(Protocol):
+    """The validity checker, see `Checker.check`."""
+
+    def __call__(
+        self, scenarios: Sequence[Scenario], is_enough: Callable[[Violation], bool] = ..., /
+    ) -> list[Verdict]:
+        """Return one verdict per scenario."""
+        ...
+
 
 NO_LIMIT_COUNT = 1 << 30  # with one clock for all vehicles, conflicts depend on the road alone
 PILOT_CANDIDATES = 2 * BLOCK_CANDIDATES  # by which a level is judged
@@ -87,7 +105,7 @@ class ValidityFilter:
             ends without a leader; empty: there is no such limit.
     """
 
-    check: Check
+    check: CheckScenarios
     max_absent: int
     enough: float
     lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
@@ -96,7 +114,7 @@ class ValidityFilter:
     max_end_braking: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    def of(cls, sampler: Sampler, check: Check, enough: float) -> "ValidityFilter":
+    def of(cls, sampler: Sampler, check: CheckScenarios, enough: float) -> "ValidityFilter":
         """Find what the drive without deviations loses."""
         undisturbed = sampler.undisturbed()
         if undisturbed is None:
@@ -128,7 +146,7 @@ class ValidityFilter:
         """Return the first cause for which each scenario is refused, None for a valid one."""
         unfit = [self._unfit(scenario) for scenario in scenarios]
         checked = [each for each, cause in zip(scenarios, unfit, strict=True) if cause is None]
-        verdicts = iter(self.check(checked) if checked else [])
+        verdicts = iter(self.check(checked, self._decides) if checked else [])
         return [cause or self._cause(next(verdicts)) for cause in unfit]
 
     def _unfit(self, scenario: Scenario) -> Cause | None:
@@ -142,10 +160,13 @@ class ValidityFilter:
         return None
 
     def _cause(self, verdict: Verdict) -> Cause | None:
-        for violation in verdict.violations:
-            if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
-                return violation.cause
+        for violation in filter(self._decides, verdict.violations):
+            return violation.cause
         return Cause.CONFLICT_LOST if verdict.not_applicable > self.max_absent else None
+
+    def _decides(self, violation: Violation) -> bool:
+        """Return whether a violation is a reason to refuse."""
+        return violation.cause != Cause.REACTION or violation.vehicles not in self.lost
 
     def _is_short(self, scenario: Scenario) -> bool:
         """Whether a scenario is short, or a vehicle hardly drives in it."""

@@ -10,7 +10,7 @@ from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.draw import enough_share
 from scenario_gen.method.sampling.filters import (
-    Check,
+    CheckScenarios,
     Filters,
     MIN_RARITY_SCENARIOS,
     PILOT_CANDIDATES,
@@ -41,7 +41,7 @@ class NaturalScenarios:
     def of(
         cls,
         plan: Plan,
-        check: Check,
+        check: CheckScenarios,
         config: SamplingConfig,
         seed: int,
         measures: Measures | None = None,

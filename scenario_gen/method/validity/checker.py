@@ -3,8 +3,9 @@
 
 """The checker: proves a scenario valid at every instant, or reports each fault."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -168,16 +169,24 @@ class Checker:
             sentences += ("traffic_rule: the request ignores the map's rules",)
         return sentences
 
-    def check(self, scenarios: Sequence[Scenario]) -> list[Verdict]:
+    def check(
+        self,
+        scenarios: Sequence[Scenario],
+        is_enough: Callable[[Violation], bool] = lambda _: False,
+    ) -> list[Verdict]:
         """Return one verdict per scenario.
+
+        Args:
+            scenarios: of the request.
+            is_enough: whether a violation decides, so that later ones are not looked for.
 
         Raises:
             InputError: the arrays of a scenario disagree in shape, or its vehicles or its frame
                 are not those of the request.
         """
-        return [self._check(scenario) for scenario in scenarios]
+        return [self._check(scenario, is_enough) for scenario in scenarios]
 
-    def _check(self, scenario: Scenario) -> Verdict:
+    def _check(self, scenario: Scenario, is_enough: Callable[[Violation], bool]) -> Verdict:
         self._refuse_misfits(scenario)
         recorded = self.conflicts or ()
         unusable = _unusable_value(scenario)
@@ -186,22 +195,37 @@ class Checker:
         met = find_conflicts(scenario)
         by_pair = conflicts_by_pair(met)
         conflicts = [by_pair.get(conflict.pair) for conflict in recorded]
-        gaps = lane_gaps(scenario)
         present = sum(conflict is not None for conflict in conflicts)
-        violations = (
-            *self._state_faults(scenario),
-            *motion_violations(scenario, self._limits),
-            *self._footprint_faults(scenario),
-            *self._wrong_ways(scenario),
-            *self._broken_rules(scenario, met),
-            *light_violations(scenario, self.at_red, self.stops),
-            *wait_violations(scenario, self.waits or (), self.requested, self._limits),
-            *order_violations(recorded, self._first, conflicts),
-            *broken_reactions(scenario, conflicts, self.reactions, self._limits, gaps),
-            *clearance_violations(scenario, self.abreast),
-            *self._tailgaters(scenario, gaps),
-        )
-        return Verdict(violations, present, len(recorded) - present)
+        violations = []
+        for violation in self._violations(scenario, met, conflicts):
+            violations.append(violation)
+            if is_enough(violation):
+                break
+        return Verdict(tuple(violations), present, len(recorded) - present)
+
+    def _violations(
+        self, scenario: Scenario, met: Sequence[Conflict], conflicts: Sequence[Conflict | None]
+    ) -> Iterator[Violation]:
+        """Yield the violations of a scenario whose values are usable.
+
+        Args:
+            scenario: of the request.
+            met: all its conflicts.
+            conflicts: those of the template, None for one that it does not have.
+        """
+        yield from self._state_faults(scenario)
+        yield from motion_violations(scenario, self._limits)
+        yield from self._footprint_faults(scenario)
+        yield from self._wrong_ways(scenario)
+        yield from self._broken_rules(scenario, met)
+        yield from light_violations(scenario, self.at_red, self.stops)
+        yield from wait_violations(scenario, self.waits or (), self.requested, self._limits)
+        yield from order_violations(self.conflicts or (), self._first, conflicts)
+        gaps = lane_gaps(scenario)
+        yield from broken_reactions(scenario, conflicts, self.reactions, self._limits, gaps)
+        yield from clearance_violations(scenario, self.abreast)
+        if self.lane_gaps is not None:
+            yield from tailgaters(scenario, gaps, self.lane_gaps, self._limits)
 
     def _refuse_misfits(self, scenario: Scenario) -> None:
         """Refuse a scenario that cannot be compared with the request."""
@@ -246,10 +270,11 @@ class Checker:
         half = np.array([vehicle.half for vehicle in bodies.vehicles])
         control = np.empty((n, t - 1, 4, 2))
         control_points(bodies.time, bodies.position, bodies.heading, bodies.speed, control)
-        faults = list(contact_violations(bodies, control, half, self._limits))
+        faults = contact_violations(bodies, control, half, self._limits)
         if self.road is not None:
             resolution = self._limits.time_resolution
-            faults += exit_violations(bodies, control, half, self._ground_of, resolution)
+            exits = exit_violations(bodies, control, half, self._ground_of, resolution)
+            faults = chain(faults, exits)
         owners = bodies.owners
         for fault in faults:
             vehicles = sorted({owners[n] for n in fault.vehicles})
@@ -292,11 +317,6 @@ class Checker:
         for breach in self._rules.breaches(scenario, conflicts):
             message = f"vehicle {scenario.vehicles[breach.vehicles[0]].id}: {breach.message}"
             yield Violation(Cause.TRAFFIC_RULE, breach.time, breach.vehicles, message)
-
-    def _tailgaters(self, scenario: Scenario, gaps: LaneGaps) -> Iterator[Violation]:
-        """Yield vehicles that follow closer than in the template, if its gaps are known."""
-        if self.lane_gaps is not None:
-            yield from tailgaters(scenario, gaps, self.lane_gaps, self._limits)
 
 
 def _refuse_shapes(scenario: Scenario, label: str) -> None:

@@ -186,11 +186,13 @@ class RuleCheck:
 
     def _lanes_before(self, motion: Motion, n: int, entry: float) -> set[int]:
         """Return which lanes of rules a vehicle drives on in the last metres before a time [s]."""
-        before = motion.is_present[n] & (motion.time <= entry + 1e-9)
-        if not before.any():
+        first, last = motion.present[n].tolist()
+        end = min(int(np.searchsorted(motion.time, entry + 1e-9, side="right")), last + 1)
+        if end <= first:
             return set()
-        driven = arc_lengths(motion.position[n])
-        before &= driven >= driven[before][-1] - _LIMITS.lane_to_conflict_m
+        driven = arc_lengths(motion.position[n, :end])
+        begin = int(np.searchsorted(driven, driven[-1] - _LIMITS.lane_to_conflict_m))
+        before = slice(max(begin, first), end)
         poses = np.column_stack((motion.position[n, before], motion.heading[n, before]))
         low, high = poses[:, :2].min(axis=0), poses[:, :2].max(axis=0)
         near = ((self._low <= high) & (self._high >= low)).all(axis=1)

@@ -29,7 +29,7 @@ from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violatio
 PLAIN = SamplingConfig(drivers=0.0, bend_acceleration=5.0)
 
 
-def all_valid(scenarios):
+def all_valid(scenarios, _=None):
     return [Verdict() for _ in scenarios]
 
 
@@ -221,7 +221,7 @@ def test_lateral_deviation_fits_narrow_roads(rows):
 
 
 def test_refusals_are_counted_by_cause():
-    def strict(scenarios):
+    def strict(scenarios, _=None):
         wide = [np.abs(s.position[0, :, 1]).max() > 0.12 for s in scenarios]
         return [
             Verdict((Violation(Cause.OFF_ROAD, 0.0, (0,), ""),)) if w else Verdict() for w in wide
@@ -241,7 +241,7 @@ def test_levels_follow_the_valid_share(drivers, share):
     enough = math.ceil(share * PILOT_CANDIDATES)
     for accepted in (enough, enough - 1):
 
-        def first_ones(scenarios, accepted=accepted):
+        def first_ones(scenarios, _=None, accepted=accepted):
             fault = Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),))
             numbers = (place_of(scenario.index)[1] for scenario in scenarios)
             return [Verdict() if number < accepted else fault for number in numbers]
@@ -252,7 +252,7 @@ def test_levels_follow_the_valid_share(drivers, share):
 
 
 def test_short_set_has_its_account():
-    def never(scenarios):
+    def never(scenarios, _=None):
         return [Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),)) for _ in scenarios]
 
     found = drawn(count=10, check=never, config=SamplingConfig(drivers=0.0, attempts=5))
