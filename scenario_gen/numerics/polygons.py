@@ -75,6 +75,17 @@ def distance_field(is_open: Bools) -> Floats:
     return sealed(distance)
 
 
+@kernel(inline=True)
+def is_row_open(distance: Floats, row: int, begin: int, end: int) -> bool:
+    """Whether the cells of a row from `begin` to before `end` are open, by their distances."""
+    column = begin
+    while column < end:
+        if distance[row, column] == 0.0:
+            return False
+        column += int(distance[row, column] + 0.5)  # no square is closed before
+    return True
+
+
 @kernel(B2, OUT2)
 def distance_transform(is_open: Bools, out: Floats) -> None:
     """Fill `out` (H, W), zeros, with the distances [cells] from open cells to closed squares.

@@ -17,7 +17,6 @@ from scenario_gen.base.road_users import LANE_USERS
 from scenario_gen.numerics import (
     Bools,
     canonical_poses,
-    Counts,
     Floats,
     freeze,
     frozen,
@@ -156,14 +155,6 @@ class Road:
         from scenario_gen.numerics.polygons import distance_field  # loads numba
 
         return distance_field(self.closed_cells)
-
-    @cached_property
-    def closed_before(self) -> Counts:
-        """(H, W + 1): number of closed cells left of each column, to count in any run."""
-        height, width = self.drivable.shape
-        closed = np.zeros((height, width + 1), dtype=np.int32)
-        np.logical_not(self.drivable, out=closed[:, 1:])
-        return sealed(np.cumsum(closed, axis=1, out=closed))
 
     @cached_property
     def walkable(self) -> "Road":

@@ -18,8 +18,9 @@ import numpy as np
 
 from scenario_gen.method.validity.cubic import Proof, split_cubic
 from scenario_gen.method.validity.dynamics import vehicle_groups
-from scenario_gen.numerics import Counts, Floats
-from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, named, OUT2
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, named, OUT2
+from scenario_gen.numerics.polygons import is_row_open
 from scenario_gen.types import Cause, Road, Scenario, Vehicle, Violation
 
 _CONTACT_CELLS = 1e-9  # a smaller overlap is a mere contact
@@ -30,13 +31,11 @@ class Ground(NamedTuple):
 
     Attributes:
         clearance: (H, W) distance [cells] from each centre to the nearest cell that is blocked.
-        blocked: (H, W + 1) number of blocked cells to the left, see `Road.closed_before`.
         x, y: lower-left corner of the grid [m].
         size: of a cell [m].
     """
 
     clearance: Floats
-    blocked: Counts
     x: float
     y: float
     size: float
@@ -45,7 +44,7 @@ class Ground(NamedTuple):
     def of(cls, road: Road) -> "Ground":
         """Return the cells of a road."""
         x, y = road.origin
-        return cls(road.clearance_cells, road.closed_before, x, y, road.resolution)
+        return cls(road.clearance_cells, x, y, road.resolution)
 
 
 class _Rectangle(NamedTuple):
@@ -60,7 +59,7 @@ class _Rectangle(NamedTuple):
 
 
 @kernel(inline=True)
-def _is_drivable(blocked: Counts, box: _Rectangle) -> bool:
+def _is_drivable(clearance: Floats, box: _Rectangle) -> bool:
     """Whether a rectangle covers drivable cells only."""
     a, b, c, s = box.length, box.width, box.cos, box.sin
     if c < 0.0:  # half a turn gives the same rectangle
@@ -70,7 +69,7 @@ def _is_drivable(blocked: Counts, box: _Rectangle) -> bool:
         c, s = -s, c
     top = a * s + b * c  # of the highest corner, relative to the centre
     right = a * c + b * s  # of the rightmost corner
-    rows, columns = blocked.shape[0], blocked.shape[1] - 1
+    rows, columns = clearance.shape
     first = int(np.floor(box.y - top + _CONTACT_CELLS))
     last = int(np.ceil(box.y + top - _CONTACT_CELLS)) - 1
     if first < 0 or last >= rows:
@@ -82,7 +81,7 @@ def _is_drivable(blocked: Counts, box: _Rectangle) -> bool:
         left_end, right_end = _row_ends(a, b, c, s, low, high)
         begin = max(int(np.floor(box.x - left_end + _CONTACT_CELLS)), 0)
         end = min(int(np.ceil(box.x + right_end - _CONTACT_CELLS)), columns)
-        if end > begin and blocked[row, end] != blocked[row, begin]:
+        if not is_row_open(clearance, row, begin, end):
             return False
     return True
 
@@ -174,12 +173,12 @@ def _first_exit(
             width + left + length * turn,
         )
         if _discs_are_drivable(ground.clearance, box, moved) or _is_drivable(
-            ground.blocked, swept
+            ground.clearance, swept
         ):
             u += step
             step = min(2.0 * step, 1.0 - u)
             continue
-        if not _is_drivable(ground.blocked, box):
+        if not _is_drivable(ground.clearance, box):
             return Proof.VIOLATED.value, middle
         step *= 0.5
         if step * h < resolution:
@@ -187,7 +186,7 @@ def _first_exit(
     return Proof.PROVEN.value, 1.0
 
 
-@kernel(F1, F4, F2, F2, named(Ground, F2, N2, F, F, F), F, OUT2)
+@kernel(F1, F4, F2, F2, named(Ground, F2, F, F, F), F, OUT2)
 def first_exits(
     time: Floats,
     control: Floats,

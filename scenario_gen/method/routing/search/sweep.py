@@ -26,8 +26,9 @@ from scenario_gen.method.routing.search.dubins import (
     TURNS,
 )
 from scenario_gen.method.routing.search.planner import PoseQuery
-from scenario_gen.numerics import Counts, Floats, sealed, wrap_angle
-from scenario_gen.numerics.kernels import F, F2, kernel, N2, named, OUT1, OUT2
+from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics.kernels import F, F2, kernel, named, OUT1, OUT2
+from scenario_gen.numerics.polygons import is_row_open
 from scenario_gen.roads import CONTACT_CELLS, segment_free, to_cells
 from scenario_gen.types import Road
 
@@ -35,7 +36,6 @@ SWEEP_M = 0.2  # between two poses whose hull is compared with the grid
 MAX_DISCS_COUNT = 6  # that cover a footprint
 FAR_CELLS = 1e9  # room where no obstacle is near
 MAX_STEP_CELLS = 64.0  # between two poses, rotation included
-NO_GRID = sealed(np.zeros((0, 1), dtype=np.int32))
 
 
 class Body(NamedTuple):
@@ -70,7 +70,6 @@ class Scene(NamedTuple):
 
     Attributes:
         clearance: (H, W).
-        blocked: (H, W + 1) from `Road.closed_before`; unused by a disc.
         guide: (G, 3) poses of the line to stay near; may be empty.
         body: what moves.
         costs: extra costs.
@@ -78,7 +77,6 @@ class Scene(NamedTuple):
     """
 
     clearance: Floats
-    blocked: Counts
     guide: Floats
     body: Body
     costs: Costs
@@ -94,7 +92,7 @@ class _Frame(NamedTuple):
     sin: float
 
 
-SCENE = named(Scene, F2, N2, F2, named(Body, F, F, F, F), named(Costs, *6 * (F,)), OUT2)
+SCENE = named(Scene, F2, F2, named(Body, F, F, F, F), named(Costs, *6 * (F,)), OUT2)
 
 
 @kernel(inline=True)
@@ -152,22 +150,22 @@ def _hull_extents(
 @kernel(inline=True)
 def _hull_is_free(a: _Frame, b: _Frame, margin: float, scene: Scene) -> bool:
     """Whether the hull of the footprints at two frames, wider by `margin`, is drivable."""
-    blocked = scene.blocked
+    clearance = scene.clearance
     length, width = scene.body.half_length + margin, scene.body.half_width + margin
     reach_a = length * abs(a.sin) + width * abs(a.cos)
     reach_b = length * abs(b.sin) + width * abs(b.cos)
     first = int(np.floor(min(a.y - reach_a, b.y - reach_b) + CONTACT_CELLS))
     last = int(np.ceil(max(a.y + reach_a, b.y + reach_b) - CONTACT_CELLS)) - 1
-    if first < 0 or last >= blocked.shape[0]:
+    if first < 0 or last >= clearance.shape[0]:
         return False
     rows = scene.rows[:, : last - first + 1]
     _hull_extents(a, b, length, width, first, rows)
     for k in range(rows.shape[1]):
         begin = int(np.floor(rows[0, k] + CONTACT_CELLS))
         end = int(np.ceil(rows[1, k] - CONTACT_CELLS))
-        if begin < 0 or end >= blocked.shape[1]:
+        if begin < 0 or end > clearance.shape[1]:
             return False
-        if end > begin and blocked[first + k, end] != blocked[first + k, begin]:
+        if not is_row_open(clearance, first + k, begin, end):
             return False
     return True
 
@@ -401,7 +399,6 @@ def car_scene(road: Road, query: PoseQuery) -> Scene:
     rows = int(2.0 * np.hypot(half_length, half_width) + MAX_STEP_CELLS) + 8
     return Scene(
         road.clearance_cells,
-        road.closed_before,
         poses_in_cells(road, wanted.guide),
         body,
         costs,
@@ -415,7 +412,7 @@ def disc_scene(road: Road, radius: float) -> Scene:
     nothing = np.empty((0, 3))
     no_costs = Costs(0.0, 0.0, 0.0, 0.0, np.inf, np.inf)
     body = Body(0.0, cells, cells, 1.0)
-    return Scene(road.clearance_cells, NO_GRID, nothing, body, no_costs, nothing)
+    return Scene(road.clearance_cells, nothing, body, no_costs, nothing)
 
 
 def poses_in_cells(road: Road, poses: Floats) -> Floats:
