@@ -21,6 +21,7 @@ FOUNDATION = {"base", "numerics", "types"}
 ROOMS = (
     "base",
     "numerics",
+    "smoothing",
     "types",
     "bags",
     "logs",
@@ -60,6 +61,10 @@ CONCEPTS = {
     "motion between two samples": (
         "numerics/hermite.py",
         r"CubicHermiteSpline\([^)]*position|def (?:control_points|interval_at)\(",
+    ),
+    "penalised splines, and the noise of fixes": (
+        "smoothing/",
+        r"def \w*(?:smoothing_spline|fit_path|estimated_noise)\(|BSpline\.design_matrix",
     ),
     "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),

@@ -63,4 +63,4 @@ def test_reactions_are_shown_everywhere(case, encounter, tmp_path):
         (edge,) = figures["reactions"]["edges"]
         assert (edge["who"], edge["whom"], edge["kept"]) == ("2", "1", kept) and edge[
             "lag"
-        ] == pytest.approx(0.4, abs=0.05)
+        ] == pytest.approx(0.5, abs=0.05)

@@ -13,7 +13,6 @@ import numpy as np
 
 from scenario_gen.logs.cleaning import CLEANING, select
 from scenario_gen.logs.config import LogConfig, points_ahead
-from scenario_gen.logs.path import UnreconciledError
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import (
@@ -25,6 +24,7 @@ from scenario_gen.logs.smoothing import (
 )
 from scenario_gen.numerics import Bools, Floats, running_sum, runs
 from scenario_gen.numerics.plane import edge_lengths, unit
+from scenario_gen.smoothing.motion import UnreconciledError
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
 

@@ -16,26 +16,53 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import median_filter
 
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.path import (
+from scenario_gen.logs.raw import Observations
+from scenario_gen.numerics import Bools, Floats, Ints, running_sum, runs, wrap_angle
+from scenario_gen.smoothing.motion import Motion, UnreconciledError
+from scenario_gen.smoothing.noise import estimated_noise, residual_noise, white_equivalent
+from scenario_gen.smoothing.path import (
     fit_path,
     HEADINGS,
     Headings,
     headings_of,
-    Motion,
     Path,
-    SMOOTHING,
     straight_path,
-    UnreconciledError,
 )
-from scenario_gen.logs.raw import Observations
-from scenario_gen.numerics import Bools, Floats, Ints, running_sum, runs, wrap_angle
 
-_NOISE_M = (0.1, 1.5)  # bounds of the estimates
-_MIN_FIX_COUNT = 30  # moving fixes from which noise can be estimated
+
+@dataclass(frozen=True)
+class SmoothingModel:
+    """Tuning of smoothing.
+
+    Attributes:
+        standing_mps: a vehicle stands if it is slower for a second and its fixes stay in place.
+        still_mps: slower than on the way to or from standing.
+        max_shift_m: if fixes move farther while the speed is zero, the speed is wrong.
+        settling_s: at either end of a stand, free for the motion: a car stops without a step.
+        min_travel_m: a vehicle that moves less has no direction of travel.
+        straight_m: a shorter path has no shape.
+        max_path_m: a longer one, by its speeds, contradicts the fixes, which are cut before.
+        round_count: fits of path and motion in turn.
+        speed_noise_mps: bounds of the estimated noise of speeds.
+        min_doubted_s: a stretch of speeds that contradict the fixes for longer is not used.
+    """
+
+    standing_mps: float = 0.3
+    still_mps: float = 0.1
+    max_shift_m: float = 1.0
+    settling_s: float = 0.3
+    min_travel_m: float = 0.5
+    straight_m: float = 3.0
+    max_path_m: float = 200_000.0
+    round_count: int = 3
+    speed_noise_mps: tuple[float, float] = (0.3, 3.0)
+    min_doubted_s: float = 0.5
+
+
+SMOOTHING = SmoothingModel()
 
 
 def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
@@ -47,59 +74,6 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
     last = np.where(is_alone, np.minimum(last + 1, len(fix) - 1), last)
     rate: Floats = np.hypot(*(fix[last] - fix[first]).T) / (seconds[last] - seconds[first])
     return rate
-
-
-def estimated_noise(fix: Floats) -> float:
-    """Return the standard deviation [m] of fixes (F, 2) [m] about local parabolas."""
-    half = min(15, (len(fix) - 1) // 2)
-    if half < 3:
-        return 0.5
-    lag = np.arange(-half, half + 1)
-    parabola = np.linalg.pinv(np.vander(lag, 3))[2]  # its value at lag 0, from the fixes
-    residual = fix[half : len(fix) - half] - sliding_window_view(fix, len(lag), axis=0) @ parabola
-    noise = max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1]))
-    return float(np.clip(noise, *_NOISE_M))
-
-
-def residual_noise(
-    first_estimate: float, is_moving: Bools, lateral: Floats, longitudinal: Floats
-) -> float:
-    """Return the standard deviation [m] of fixes about the path and motion fitted to them.
-
-    It is at most twice the first estimate. Without that bound, noise and smoothness would increase
-    each other, since smoothing leaves noise of long memory.
-
-    Args:
-        first_estimate: returned if few fixes are of a moving vehicle, since those of a standing
-            one are often repeated.
-        is_moving: (F,) whether the vehicle moves.
-        lateral: (F,) of the fixes from the path [m].
-        longitudinal: (F,) of the fixes from the motion along it [m].
-    """
-    if is_moving.sum() < _MIN_FIX_COUNT:
-        return first_estimate
-    noise = max(white_equivalent(lateral[is_moving]), white_equivalent(longitudinal[is_moving]))
-    low, high = _NOISE_M
-    return float(np.clip(noise, low, min(2.0 * first_estimate, high)))
-
-
-def white_equivalent(noise: Floats) -> float:
-    """Return the deviation of white noise whose mean is as uncertain as that of noise (T,).
-
-    Values beyond three robust deviations are clipped; the deviation is then scaled by the root of
-    the autocorrelation time, 1 + 2 Σ ρ_l over the lags before the first ρ_l below 0.1.
-    """
-    noise = noise - np.median(noise)
-    limit = 3.0 * 1.4826 * float(np.median(np.abs(noise))) + 1e-3
-    noise = np.clip(noise, -limit, limit)
-    power = float(np.square(noise).sum())
-    time = 1.0
-    for lag in range(1, min(20, len(noise) // 3)):
-        correlation = float((noise[:-lag] * noise[lag:]).sum()) / max(power, 1e-12)
-        if correlation < 0.1:
-            break
-        time += 2.0 * correlation
-    return float(np.sqrt(power / len(noise) * time))
 
 
 DOUBTED_MPS = 3.0
@@ -145,14 +119,12 @@ class _Fit(NamedTuple):
         distance: (F,) distances driven at the fixes [m].
         coefficients: (T+1,) of the motion.
         noise: standard deviation of the fixes [m].
-        headings: recorded headings with weights, or None.
     """
 
     path: Path
     distance: Floats
     coefficients: Floats
     noise: float
-    headings: Headings | None
 
 
 def interpolated_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
@@ -215,7 +187,9 @@ def smooth_piece(piece: Observations, raw: Smooth, origin_ns: int, config: LogCo
     fix_t = _seconds(piece.fix_ns, origin_ns) - raw.first * dt
     speed_t = _seconds(piece.speed_ns, origin_ns) - raw.first * dt
     stands = standing(ticks, fix_t, piece.fix, ticks, raw.speed)
-    motion = Motion(_without_ends(stands, round(SMOOTHING.settling_s / dt)), config)
+    held = _without_ends(stands, round(SMOOTHING.settling_s / dt))
+    limits = (-config.braking_limit, config.acceleration_limit)
+    motion = Motion(held, dt, config.jerk, *limits)
     deviation = config.speed_noise
     if not deviation:
         deviation = float(np.clip(white_equivalent(raw.before), *SMOOTHING.speed_noise_mps))
@@ -290,7 +264,9 @@ def _fit_in_turn(
     noise = first_noise
     headings = None
     for _ in range(SMOOTHING.round_count):
-        path = _fit_path(piece, distance, weight, noise, np.gradient(distance, fix_t), headings)
+        path = _path_through(
+            piece, distance, weight, noise, np.gradient(distance, fix_t), headings
+        )
         arc, lateral = path.project(distance, piece.fix)
         along = (fix_t, arc, noise / np.sqrt(weight), False)
         coefficients = motion.solve([*measured, along])
@@ -302,7 +278,7 @@ def _fit_in_turn(
         weight = np.minimum(1.0, 2.0 * noise / residual)  # Huber's
         course = path.pose(distance)[1]
         headings = headings_of(piece.heading, course, np.gradient(distance, fix_t))
-    return _Fit(path, distance, coefficients, noise, headings)
+    return _Fit(path, distance, coefficients, noise)
 
 
 def _without_ends(stands: Bools, ends: int) -> Bools:
@@ -334,7 +310,7 @@ def _first_distances(
     return distance
 
 
-def _fit_path(
+def _path_through(
     piece: Observations,
     distance: Floats,
     weight: Floats,

@@ -4,12 +4,10 @@
 """The recorded motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
 
 Positions are noisy (GPS staircases of a metre, kinks from a video tracker), speeds much less. The
-position is therefore smoothed as a function of the distance u = ∫ v dt from the speed: a penalised
-spline f(u) that minimises ∫ |f(u) - p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The smallest λ is
-used for which the lateral acceleration is drivable, or the one with the smallest violation of this
-and of the deviation from the recording. Bends that are too sharp are then eased; they turn as far
-as before. Standing phases collapse to a point, time enters only through u(t), and no sample moves
-backwards.
+path is therefore fitted to the positions over the distance u = ∫ v dt from the speed, as logs do
+(`smoothing.path`), for their estimated noise. If its lateral acceleration is not drivable, more
+noise is assumed. Bends that are too sharp are then eased; they turn as far as before. Standing
+phases collapse to a point, time enters only through u(t), and no sample moves backwards.
 """
 
 from collections.abc import Sequence
@@ -19,7 +17,6 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import (
@@ -33,21 +30,22 @@ from scenario_gen.numerics import (
 )
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, polyline_of, unit
+from scenario_gen.smoothing.noise import estimated_noise
+from scenario_gen.smoothing.path import fit_path
+from scenario_gen.smoothing.spline import GRID_STEP_M
 from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle
 
-# wavelengths that the smoothing halves
-CURVATURE_SHARE = (
-    0.8  # of the sharpest curve of a type; for a car 0.2 1/m, nearly its tightest turn
-)
+CURVATURE_SHARE = 0.8  # of a type's sharpest curve; for a car 0.2 1/m, nearly its tightest turn
 LATERAL_SHARE = 2.0 / 3.0  # of a type's lateral acceleration; for a car 4 m/s²
 MAX_DEVIATION_M = 0.6  # from the recording
+MIN_NOISE_M = 0.03  # of positions that are smooth already
+NOISE_STEP_RATIO = 1.4  # by which more noise is assumed until a path is drivable
 TURN_RAD = math.radians(45.0)
 TURN_WINDOW_M = 30.0  # a bend of a road turns less within it
 MAX_BEND_RAD = math.radians(25.0)  # of a bend of a road, within it
 U_TURN_RAD = math.radians(140.0)
 U_TURN_WINDOW_M = 45.0
 MIN_PATH_M = 0.5  # a vehicle with a shorter path stands
-PATH_STEP_M = 0.5
 EASING_SHARE = 0.95  # of the allowed curvature, to which bends are eased
 
 
@@ -96,10 +94,10 @@ class Track:
 
     def turning(self, window: float) -> float:
         """Return the largest change of heading [rad, signed] over `window` metres of path."""
-        stations = np.arange(0.0, max(self.curve.length - 1.0, 0.0) + 1e-9, PATH_STEP_M)
+        stations = np.arange(0.0, max(self.curve.length - 1.0, 0.0) + 1e-9, GRID_STEP_M)
         yaw = self.curve.at(stations)[:, 2]
         largest = 0.0
-        for lag in range(2, min(int(window / PATH_STEP_M), len(yaw) - 1) + 1, 2):
+        for lag in range(2, min(int(window / GRID_STEP_M), len(yaw) - 1) + 1, 2):
             change = yaw[lag:] - yaw[:-lag]
             peak = float(change[np.argmax(np.abs(change))])
             if abs(peak) > abs(largest):
@@ -196,21 +194,26 @@ def _standing(record: _Record) -> _Path:
 
 def _smoothed(record: _Record, max_curvature: float, max_lateral: float) -> _Path:
     """The drivable path of a record; the limits are in 1/m and m/s²."""
-    smallest = math.inf
-    for wavelength in (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0):
+    least = math.inf
+    noise = estimated_noise(record.position, MIN_NOISE_M)
+    weight = np.ones(len(record.distance))
+    driven = record.distance[-1]
+    grid = np.linspace(0.0, driven, max(math.ceil(driven / GRID_STEP_M), 6) + 1)
+    speed = np.interp((grid[1:] + grid[:-1]) / 2.0, record.distance, record.speed)
+    for factor in NOISE_STEP_RATIO ** np.arange(9):
         stop_if_cancelled()
-        grid, smooth = smoothing_spline(record.distance, record.position, wavelength)
-        curve = Curve.through(smooth)
+        fitted = fit_path(record.distance, record.position, weight, factor * noise, record.speed)
+        curve = Curve.through(fitted.curve(grid))
         progress = np.interp(record.distance, grid, curve.station)
         candidate = _Path(curve, progress, _deviation(curve, progress, record))
-        middle = (grid[1:] + grid[:-1]) / 2.0
-        speed = np.interp(middle, *_increasing(record.distance, record.speed))
-        lateral = float((_curvature(curve) * np.square(speed)).max())
-        excess = (lateral / max_lateral, candidate.deviation / MAX_DEVIATION_M)
-        violation = math.fsum(max(ratio - 1.0, 0.0) for ratio in excess)
-        if violation < smallest:
-            smallest, path = violation, candidate
-        if violation == 0.0:
+        curvature = _curvature(curve)
+        lateral = float((curvature * np.square(speed)).max())
+        excess = max(lateral / max_lateral, float(curvature.max()) / max_curvature) - 1.0
+        cost = max(excess, 0.0) + candidate.deviation / MAX_DEVIATION_M
+        if cost < least:
+            least = cost
+            path = candidate
+        if excess <= 0.0 or candidate.deviation > MAX_DEVIATION_M:
             break
     curve, progress = path.curve, path.progress
     if _curvature(curve).max() > max_curvature:
@@ -237,7 +240,7 @@ def _eased(curve: Curve, max_curvature: float) -> Curve:
     The excess of a bend passes to its neighbours, so that it turns as far as before, over a longer
     distance. The path is then integrated again and placed nearest to the old one on average.
     """
-    count = max(round(curve.length / PATH_STEP_M), 1)
+    count = max(round(curve.length / GRID_STEP_M), 1)
     step = curve.length / count
     even = curve.at(np.linspace(0.0, curve.length, count + 1))
     bend = np.diff(even[:, 2])
@@ -261,49 +264,6 @@ def _aligned(path: _Path, record: _Record) -> Curve:
     off = float(record.heading[fastest] - path.curve.at(path.progress[fastest])[2])
     turns = np.round((off - float(wrap_angle(np.array(off)))) / (2.0 * np.pi))
     return Curve(path.curve.points + np.array([0.0, 0.0, 2.0 * np.pi * turns]))
-
-
-def _increasing(u: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """The values at strictly increasing u."""
-    rows = np.concatenate(([True], np.diff(u) > 1e-9))
-    return u[rows], values[rows]
-
-
-def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floats, Floats]:
-    """Return the penalised spline f at equal steps of u.
-
-    Source: Eilers & Marx 1996.
-
-    Args:
-        u: (T,) metres, non-decreasing from 0.
-        values: (T, D).
-        wavelength: metres; an oscillation of this length is halved.
-
-    Returns:
-        The grid (G,) and f on it (G, D).
-    """
-    count = max(int(np.ceil(u[-1] / PATH_STEP_M)), 6) + 1
-    grid = np.linspace(0.0, u[-1], count)
-    step = grid[1]
-    weight = np.gradient(u) + 1e-3 * step
-    cell = np.minimum((u / step).astype(np.int64), count - 2)
-    right = u / step - cell
-    left = 1.0 - right
-    bands = np.zeros(
-        (3, count)
-    )  # diagonals 0, 1, 2 on and below the diagonal of the normal matrix
-    rhs = np.zeros((count, values.shape[1]))
-    np.add.at(bands[0], cell, weight * np.square(left))
-    np.add.at(bands[0], cell + 1, weight * np.square(right))
-    np.add.at(bands[1], cell, weight * left * right)
-    np.add.at(rhs, cell, (weight * left)[:, None] * values)
-    np.add.at(rhs, cell + 1, (weight * right)[:, None] * values)
-    penalty = (wavelength / (2.0 * np.pi)) ** 4 / step**3
-    difference = (1.0, -2.0, 1.0)  # of second order
-    for a in range(3):
-        for b in range(a, 3):
-            bands[b - a, a : count - 2 + a] += penalty * difference[a] * difference[b]
-    return grid, linalg.solveh_banded(bands, rhs, lower=True)
 
 
 MAX_TURN_CHANGE_RAD: Final = np.radians(40.0)  # between turns that are the same manoeuvre

@@ -28,6 +28,7 @@ TESTS = {  # folder of scenario_gen: folders of its tests
     "method/sampling": ("method/sampling", "requests"),
     "method/fitting": ("method/fitting",),
     "method/evaluation": ("method/evaluation",),
+    "smoothing": ("smoothing", "logs", "situation"),
     "situation": ("situation",),
     "closed_loop": ("closed_loop",),
     "logs": ("logs",),
@@ -45,10 +46,9 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
     ("scenario_gen/closed_loop/search/settings.py", "prior_precision: float = (0.45)"): (
         "any prior of the allocation: the weights keep the estimate unbiased"
     ),
-    (
-        "scenario_gen/situation/tracks.py",
-        "for wavelength in (8.0, (10.8), 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0):",
-    ): "a wavelength of a grid: another one takes its place, within the same deviation",
+    ("scenario_gen/situation/tracks.py", "NOISE_STEP_RATIO = (1.26)"): (
+        "a step of a grid: another one takes its place, within the same deviation"
+    ),
     (
         "scenario_gen/method/sampling/importance_sampling.py",
         "_MIN_TTC_S = (0.09000000000000001)",

@@ -267,7 +267,7 @@ def test_platoon_keeps_its_bend_and_gaps(
     assert not [loss for loss in fit.losses if loss.kind != "arm"]
     losses = fit_template(encounter, every(encounter), build_road("straight", encounter)).losses
     assert {loss.kind for loss in losses} == {"bend"}
-    assert "vehicle 0 turns left by 80° in the recording, goes straight on" in losses[0].message
+    assert "vehicle 0 turns left by 81° in the recording, goes straight on" in losses[0].message
 
 
 def test_scale_out_of_range_is_refused():

@@ -8,21 +8,16 @@ jerk), in addition to a smaller one for the limits of steering at any speed. The
 headings, estimated per track, determines how far the path may be from either.
 """
 
-from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
-import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
-from scipy import linalg, sparse
+from scipy import linalg
 from scipy.interpolate import BSpline
 from scipy.ndimage import uniform_filter1d
 
-from scenario_gen.base.errors import InputError
-from scenario_gen.logs.config import LogConfig
-from scenario_gen.numerics import Bools, Floats, Ints, running_sum, wrap_angle
+from scenario_gen.numerics import Floats, running_sum, wrap_angle
+from scenario_gen.smoothing.spline import differences, observe
 
 
 @dataclass(frozen=True)
@@ -198,39 +193,6 @@ def fit_path(
     return _tabulate(BSpline(knots, coefficients, 3), low, high)
 
 
-def observe(
-    band: Floats,
-    right: Floats,
-    start: Ints,
-    entries: Floats,
-    stride: int,
-    weight: Floats,
-    target: Floats,
-) -> None:
-    """Add Σ weight · (entries · c - target)² to a lower band matrix and its right side.
-
-    Args:
-        band: the matrix (B, n).
-        right: the right side (n,).
-        start: (F,) first coefficient of each row.
-        entries: (F, E) of each row, `stride` coefficients apart.
-        stride: that distance.
-        weight: (F,).
-        target: (F,).
-    """
-    for i in range(entries.shape[1]):
-        np.add.at(right, start + stride * i, weight * entries[:, i] * target)
-        for j in range(i + 1):
-            products = weight * entries[:, i] * entries[:, j]
-            np.add.at(band[stride * (i - j)], start + stride * j, products)
-
-
-def differences(count: int, order: int) -> Floats:
-    """Return differences (1st to 3rd) of `count` values as rows (count - order, order + 1)."""
-    stencil = ((-1.0, 1.0), (1.0, -2.0, 1.0), (-1.0, 3.0, -3.0, 1.0))[order - 1]
-    return np.tile(stencil, (count - order, 1))
-
-
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
     """Return a straight path with `point` (2,) [m] at the distance (low + high) / 2."""
     direction = np.array([np.cos(heading), np.sin(heading)])
@@ -290,190 +252,3 @@ def _heading_noise(turn: Floats) -> Floats:
     variance = np.square(HEADINGS.noise_rad) + HEADINGS.shared_error_factor * scatter
     noise: Floats = np.sqrt(variance)
     return noise
-
-
-@dataclass(frozen=True)
-class SmoothingModel:
-    """Tuning of smoothing.
-
-    Attributes:
-        standing_mps: a vehicle stands if it is slower for a second and its fixes stay in place.
-        still_mps: slower than on the way to or from standing.
-        max_shift_m: if fixes move farther while the speed is zero, the speed is wrong.
-        settling_s: at either end of a stand, free for the motion: a car stops without a step.
-        min_travel_m: a vehicle that moves less has no direction of travel.
-        straight_m: a shorter path has no shape.
-        max_path_m: a longer one, by its speeds, contradicts the fixes, which are cut before.
-        round_count: fits of path and motion in turn.
-        speed_noise_mps: bounds of the estimated noise of speeds.
-        min_doubted_s: a stretch of speeds that contradict the fixes for longer is not used.
-    """
-
-    standing_mps: float = 0.3
-    still_mps: float = 0.1
-    max_shift_m: float = 1.0
-    settling_s: float = 0.3
-    min_travel_m: float = 0.5
-    straight_m: float = 3.0
-    max_path_m: float = 200_000.0
-    round_count: int = 3
-    speed_noise_mps: tuple[float, float] = (0.3, 3.0)
-    min_doubted_s: float = 0.5
-
-
-SMOOTHING = SmoothingModel()
-
-
-class UnreconciledError(InputError):
-    """No motion of a car fits speeds and positions."""
-
-
-class Motion:
-    """Distance along a path over time: a quadratic B-spline fitted by a quadratic program.
-
-    With coefficients c_0 … c_T and ticks i = 0 … T-1: distance s_i = (c_i + c_{i+1})/2, speed
-    v_i = (c_{i+1} - c_i)/dt, and the acceleration between two ticks is constant. Second and third
-    differences of c are acceleration and jerk, so limits on speed and acceleration are sparse
-    linear inequalities. While a vehicle stands, its coefficients are one variable: v = 0 exactly.
-    """
-
-    def __init__(self, stands: Bools, config: LogConfig) -> None:
-        """Set up the program; the speed is zero at the ticks at which `stands` (T,) is true."""
-        dt = config.period
-        self.dt = dt
-        self.ticks = len(stands)
-        # v_i = 0 makes c_{i+1} the variable of c_i.
-        self.variable = np.concatenate([[0], np.cumsum(~stands)])
-        self.size = int(self.variable[-1]) + 1
-        start, third = self._differences(3)
-        weight = np.full(len(start), dt / (config.jerk * dt**3) ** 2)
-        self.prior = np.zeros((4, self.size + 3))
-        no_target = np.zeros(len(weight))
-        observe(self.prior, np.zeros(self.size + 3), start, third, 1, weight, no_target)
-        self.highest = config.acceleration_limit
-        self.lowest = -config.braking_limit
-
-    def _is_within_limits(self, variables: Floats) -> bool:
-        """Return whether variables (V,) keep the limits of speed and acceleration."""
-        coefficients = variables[self.variable]
-        acceleration = np.diff(coefficients, 2) / self.dt**2
-        is_forwards = (np.diff(coefficients) >= 0.0).all()
-        return bool(
-            is_forwards
-            and acceleration.max(initial=0.0) <= self.highest
-            and acceleration.min(initial=0.0) >= self.lowest
-        )
-
-    def _limits(self) -> tuple[Any, Floats]:
-        """Return the matrix and right side of the limits: speed, acceleration, deceleration."""
-        n = len(self.variable)
-        merge = sparse.csc_array((np.ones(n), (np.arange(n), self.variable)))
-        stencils = [np.full((order + 1, n), differences(n, order)[0][:, None]) for order in (1, 2)]
-        speed, acceleration = (
-            sparse.dia_array((stencil, np.arange(order + 1)), (n - order, n)) @ merge
-            for order, stencil in enumerate(stencils, 1)
-        )
-        blocks = (-speed / self.dt, acceleration / self.dt**2, -acceleration / self.dt**2)
-        rows = sparse.vstack(blocks).tocsc()
-        rows.eliminate_zeros()
-        limits = [0.0, self.highest, -self.lowest]
-        return rows, np.repeat(limits, [n - 1, n - 2, n - 2])
-
-    def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
-        """Return rows (F, E) over coefficients from `tick` (F,) on as rows over variables.
-
-        Returns:
-            The first variable (F,), and the rows (F, E) from it on.
-        """
-        rows = np.zeros(weights.shape)
-        start = self.variable[tick]
-        variables = self.variable[tick[:, None] + np.arange(weights.shape[1])]
-        column = variables - start[:, None]
-        np.add.at(rows, (np.arange(len(tick))[:, None], column), weights)
-        return start, rows
-
-    def _differences(self, order: int) -> tuple[Ints, Floats]:
-        """Return differences of the coefficients as rows over variables, as `_merged` does."""
-        tick = np.arange(len(self.variable) - order)
-        return self._merged(tick, differences(len(self.variable), order))
-
-    def _weights(
-        self, seconds: Floats, *, speed: bool = False
-    ) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
-        """Return the weights of coefficients in the distances, or speeds, at any times (F,).
-
-        Returns:
-            The first of three coefficients (F,), and the weight (F,) of each.
-        """
-        tick = np.clip(np.floor(seconds / self.dt).astype(np.int64), 0, max(self.ticks - 2, 0))
-        u = seconds / self.dt - tick
-        if speed:
-            return tick, ((u - 1.0) / self.dt, (1.0 - 2.0 * u) / self.dt, u / self.dt)
-        return tick, (np.square(1.0 - u) / 2.0, 0.5 + u - np.square(u), np.square(u) / 2.0)
-
-    def solve(self, observed: Sequence[tuple[Floats, Floats, Floats, bool]]) -> Floats:
-        """Return the coefficients (T+1,) that fit best.
-
-        Args:
-            observed: times, values, standard deviations (F,), and whether values are speeds.
-
-        Raises:
-            UnreconciledError: the solver finds no solution.
-        """
-        quadratic = self.prior.copy()
-        linear = np.zeros(self.size + 3)
-        for seconds, values, deviation, are_speeds in observed:
-            tick, weights = self._weights(seconds, speed=are_speeds)
-            start, rows = self._merged(tick, np.column_stack(weights))
-            observe(quadratic, linear, start, rows, 1, 1.0 / np.square(deviation), values)
-        best = self._optimum(quadratic[:, : self.size], linear[: self.size])
-        # Within the solver's tolerance, the motion may run backwards.
-        increasing = np.maximum.accumulate(best)
-        return np.asarray(increasing[self.variable])
-
-    def _optimum(self, quadratic: Floats, linear: Floats) -> Floats:
-        """Return the variables of least cost within the limits.
-
-        The optimum without limits is 20 times as fast; mostly no limit is reached there.
-
-        Args:
-            quadratic: lower bands (4, V) of the cost's matrix.
-            linear: (V,) right side.
-
-        Raises:
-            UnreconciledError: the solver finds no solution.
-        """
-        with suppress(np.linalg.LinAlgError):
-            free = np.asarray(linalg.solveh_banded(quadratic, linear, lower=True))
-            if self._is_within_limits(free):
-                return free
-        constraints, bounds = self._limits()
-        shape = (self.size, self.size)
-        lower = sparse.dia_array((quadratic, -np.arange(4)), shape)
-        upper = lower.T.tocsc()
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
-        cones = [clarabel.NonnegativeConeT(len(bounds))]
-        for equilibrate in (True, False):  # scaling worsens the matrix if fixes are seconds apart
-            settings.equilibrate_enable = equilibrate
-            solver = clarabel.DefaultSolver(upper, -linear, constraints, bounds, cones, settings)
-            solution = solver.solve()
-            if solution.status in (
-                clarabel.SolverStatus.Solved,
-                clarabel.SolverStatus.AlmostSolved,
-            ):
-                return np.asarray(solution.x)
-        raise UnreconciledError("speeds and positions contradict each other; check their units")
-
-    def place(self, coefficients: Floats, seconds: Floats) -> Floats:
-        """Return the distances (F,) [m] at any times (F,) [s] for coefficients (T+1,)."""
-        tick, (w0, w1, w2) = self._weights(seconds)
-        distance: Floats = (
-            w0 * coefficients[tick] + w1 * coefficients[tick + 1] + w2 * coefficients[tick + 2]
-        )
-        return distance
-
-    def at_ticks(self, coefficients: Floats) -> tuple[Floats, Floats]:
-        """Return distances (T,) [m] and speeds (T,) [m/s] at the ticks for coefficients (T+1,)."""
-        return (coefficients[1:] + coefficients[:-1]) / 2.0, np.diff(coefficients) / self.dt

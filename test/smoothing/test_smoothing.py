@@ -13,14 +13,16 @@ from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
 from scenario_gen.logs.encounters import cut_track, pieces_of
-from scenario_gen.logs.path import fit_path, headings_of, Motion, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import (
     interpolated_piece,
     smooth_piece,
     standing,
-    white_equivalent,
 )
+from scenario_gen.smoothing.motion import Motion
+from scenario_gen.smoothing.noise import estimated_noise, white_equivalent
+from scenario_gen.smoothing.path import fit_path, headings_of, straight_path
+from scenario_gen.smoothing.spline import smoothing_spline
 
 CONFIG = LogConfig()
 
@@ -29,7 +31,7 @@ def test_motion_minimises_its_quadratic_program():
     """Against scipy's general-purpose solver on a small case with active limits."""
     rng = np.random.Generator(np.random.PCG64(3))
     config = LogConfig(jerk=5.0, acceleration_limit=1.0, braking_limit=2.0)
-    motion = Motion(np.zeros(12, dtype=bool), config)
+    motion = Motion(np.zeros(12, dtype=bool), config.period, 5.0, -2.0, 1.0)
     time = np.sort(rng.uniform(0.0, 1.1, 15))
     place = np.where(time < 0.5, 2.0 * time, 1.0) + rng.normal(0.0, 0.05, 15)
     found = motion.solve([(time, place, np.full(15, 0.1), False)])
@@ -55,7 +57,7 @@ def test_motion_minimises_its_quadratic_program():
 
 def test_between_samples_the_acceleration_is_constant():
     rng = np.random.Generator(np.random.PCG64(4))
-    motion = Motion(np.zeros(30, dtype=bool), CONFIG)
+    motion = Motion(np.zeros(30, dtype=bool), 0.1, 0.5, -8.0, 5.0)
     coefficients = np.cumsum(rng.uniform(0.0, 1.0, 31))
     place, speed = motion.at_ticks(coefficients)
     np.testing.assert_allclose(np.diff(place), (speed[1:] + speed[:-1]) / 2.0 * 0.1, atol=1e-12)
@@ -198,12 +200,35 @@ def test_missing_headings_are_not_used(wrong):
 
 
 def test_headings_are_weighed_by_their_scatter():
-    rng = np.random.Generator(np.random.PCG64(9))
+    """Headings that alternate by ±a turn by 2a, of which the second difference is 4a."""
     course, speed = np.zeros(200), np.full(200, 5.0)
-    steady = headings_of(course, course, speed)
-    scattered = headings_of(rng.normal(0.0, np.radians(3.0), 200), course, speed)
-    assert np.median(scattered.weight) < steady.weight.min() / 3.0
+    scatter = np.radians(0.5) * (-1.0) ** np.arange(200)
+    for heading, added in ((course, 0.0), (scatter, 9.0 * (4.0 * np.radians(0.5)) ** 2 / 6.0)):
+        weight = headings_of(heading, course, speed).weight
+        np.testing.assert_allclose(weight, 1.0 / (np.radians(2.0) ** 2 + added), rtol=1e-9)
     assert headings_of(np.full(200, np.nan), course, speed) is None
+
+
+def test_noise_is_independent_of_axes():
+    rng = np.random.Generator(np.random.PCG64(6))
+    along = np.linspace(0.0, 90.0, 300)
+    fix = np.column_stack((along, 0.002 * along**2)) + rng.normal(0.0, (0.2, 0.5), (300, 2))
+    turned = fix @ np.array([[0.6, 0.8], [-0.8, 0.6]])
+    assert estimated_noise(turned) == pytest.approx(estimated_noise(fix), rel=1e-9)
+    assert estimated_noise(fix) == pytest.approx(0.5, rel=0.1)
+    smooth = np.column_stack((along, np.zeros(300)))
+    assert (estimated_noise(smooth), estimated_noise(smooth, 0.02)) == (0.1, 0.02)
+    assert estimated_noise(smooth[:5]) == 0.5
+
+
+@pytest.mark.parametrize("wavelength", [20.0, 60.0])
+def test_a_spline_halves_its_wavelength(wavelength):
+    u = np.linspace(0.0, 600.0, 2401)
+    wave = np.column_stack((np.cos(2.0 * np.pi * u / wavelength), np.ones(len(u))))
+    grid, smooth = smoothing_spline(u, wave, wavelength)
+    middle = np.abs(grid - 300.0) < wavelength
+    assert np.ptp(smooth[middle, 0]) == pytest.approx(1.0, rel=0.02)
+    np.testing.assert_allclose(smooth[:, 1], 1.0, atol=1e-9)
 
 
 def test_reversing_in_a_stop_is_cut():
