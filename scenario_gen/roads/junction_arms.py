@@ -282,18 +282,15 @@ def lanes_of_arm(arm: ArmDirection, config: RoadConfig) -> ArmLanes:
     }
     sure = [end.key for end in arm.ends if end.reaches_arm and end.steady >= SURE_LENGTH_M / 2.0]
     sure = sure or list(outside)
-
-    inward, outward = (
-        {end.vehicle for end in arm.ends if end.inward is way} for way in (True, False)
-    )
-    least = int(np.ceil(_U_TURN_WIDTH_M / width)) if inward & outward else 0
+    makes_u_turn = len({end.vehicle for end in arm.ends}) < len(arm.ends)
+    least = int(np.ceil(_U_TURN_WIDTH_M / width)) if makes_u_turn else 0
     lane_of = _lanes_of_ends({key: outside[key] for key in sure}, width, least)
     lines = [side[key[1]] * (outside[key] - (lane_of[key] + 0.5) * width) for key in sure]
-    dividing_line = float(np.mean(lines)) if lines else 0.0
-    used = {way: [lane_of[key] for key in sure if key[1] is way] or [0] for way in (True, False)}
+    dividing_line = float(np.mean(lines or [0.0]))
     for key in outside.keys() - lane_of.keys():  # the nearest lane that the arm already has
+        used = [lane_of[other] for other in sure if other[1] is key[1]] or [0]
         nearest = round((outside[key] - side[key[1]] * dividing_line) / width - 0.5)
-        lane_of[key] = min(max(nearest, min(used[key[1]])), max(used[key[1]]))
+        lane_of[key] = min(max(nearest, min(used)), max(used))
     return ArmLanes(dividing_line, lane_of)
 
 

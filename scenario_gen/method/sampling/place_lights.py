@@ -3,7 +3,7 @@
 
 """Which light of a road shows what: recorded states by the vehicles that face it, or its cycle."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
 
@@ -130,21 +130,40 @@ def _with_offset(
     }
     if not crossings:
         return PlacedLights(tuple(cycles))
-    runners = {who for who, _, slack in graph.crossings if slack == 0.0}
     departures = _departures(cycles, nominal, graph)
+    offset = _best_offset(cycles, nominal, crossings, departures, graph)
+    first = min(time for _, time in crossings.values()) + begin
+    anchor = float(np.interp(first, clock.time, clock.grid))
+    by = offset + begin - (first - anchor)
+    moved = tuple(light.retimed(lambda at: at + by) for light in cycles)
+    return PlacedLights(moved, anchor, departures)
+
+
+def _best_offset(
+    cycles: Sequence[TrafficLight],
+    nominal: Scenario,
+    crossings: Mapping[int, tuple[TrafficLight, float]],
+    departures: Sequence[Departure],
+    graph: ReactionGraph,
+) -> float:
+    """Return the offset [s] of cycles that suits the crossings of vehicles best.
+
+    Raises:
+        RefusedError: no offset suits all vehicles.
+    """
     period = max(light.schedule.end - light.schedule.starts[0] for light in cycles)
-    offsets = np.arange(0.0, period, 0.1)  # s
+    offsets = np.arange(0.0, period, 0.1).tolist()  # s
     slacks = np.array(
         [
             [light.schedule.slack(time - offset) for light, time in crossings.values()]
-            for offset in offsets.tolist()
+            for offset in offsets
         ]
     )
+    runners = {who for who, _, slack in graph.crossings if slack == 0.0}
     runs = np.array([n in runners for n in crossings])
     least = np.min(slacks, axis=1, where=~runs, initial=period)
     delays = [
-        [abs(each.lateness(cycles, nominal, offset)) for each in departures]
-        for offset in offsets.tolist()
+        [abs(each.lateness(cycles, nominal, offset)) for each in departures] for offset in offsets
     ]
     latest = np.max(delays, axis=1, initial=0.0)
     suits = (least > 0.0) & ~(slacks[:, runs] > 0.0).any(axis=1) & (latest < _MAX_LATENESS_S)
@@ -154,11 +173,7 @@ def _with_offset(
             " set road.signals=recorded, or road.traffic_rules=ignored"
         )
     best = int(np.argmin(np.where(suits, latest - _SLACK_SHARE * least, np.inf)))
-    first = min(time for _, time in crossings.values()) + begin
-    anchor = float(np.interp(first, clock.time, clock.grid))
-    by = float(offsets[best]) + begin - (first - anchor)
-    moved = tuple(light.retimed(lambda at: at + by) for light in cycles)
-    return PlacedLights(moved, anchor, departures)
+    return float(offsets[best])
 
 
 def _departures(
