@@ -18,11 +18,13 @@ from benchmarks._paper_speed_profile import knots_on, SpeedProfile, SpeedProfile
 from benchmarks._reference_sets import without_changepoints
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.fitting.fit import assemble_fit
+from scenario_gen.method.fitting.placement import place_given
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.situation import find_waits, Wait
+from scenario_gen.situation import find_waits, Situation, Wait
 from scenario_gen.types import Dynamics, Encounter, Fit, Road, Route, Segmentation
 
 SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3
@@ -164,14 +166,7 @@ def _evenly_scaled(
 
     def scales(cells: Floats) -> Floats:
         starts, goals = lanes.ends(road, cells)
-        fit = fit_template(
-            encounter,
-            without_changepoints(segmentation),
-            road,
-            FITTING,
-            starts=starts,
-            goals=goals,
-        )
+        fit = _fit_to_ends(encounter, without_changepoints(segmentation), road, (starts, goals))
         return np.array([fitted.scale for fitted in fit.fitted])
 
     most = np.full(len(encounter.vehicles), lanes.most_cells())
@@ -181,6 +176,16 @@ def _evenly_scaled(
     with np.errstate(divide="ignore", invalid="ignore"):
         cells = np.where(slope > 0.0, most - (wide - target) / slope, most)
     return lanes.ends(road, np.clip(np.where(lanes.still, most, cells), 0.05 * most, most))
+
+
+def _fit_to_ends(
+    encounter: Encounter, segmentation: Segmentation, road: Road, ends: tuple[Floats, Floats]
+) -> Fit:
+    """The fit with start and end poses (N, 3) of all vehicles."""
+    situation = Situation.of(encounter)
+    starts, goals = (np.pad(poses, ((0, 0), (0, 1)), constant_values=np.nan) for poses in ends)
+    placement, given = place_given(situation, road, FITTING, starts, goals)
+    return assemble_fit(situation, segmentation, road, placement, FITTING, given)
 
 
 def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float]:
@@ -216,7 +221,7 @@ def sample(
         RefusedError: it cannot be placed, planned or timed.
     """
     try:
-        fit = fit_template(encounter, segmentation, road, FITTING, starts=ends[0], goals=ends[1])
+        fit = _fit_to_ends(encounter, segmentation, road, ends)
         routes = plan_polylines(road, fit, PLANNING, seed)
         waits = find_waits(encounter) if segmentation.changepoints.size else ()
         drawn = [

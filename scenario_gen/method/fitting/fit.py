@@ -219,8 +219,6 @@ def fit_template(
     road: Road,
     config: FittingConfig = FittingConfig(),
     *,
-    starts: Floats | None = None,
-    goals: Floats | None = None,
     request: Request = Request(),
     limits: TypeLimits = TypeLimits(),
 ) -> Fit:
@@ -232,9 +230,6 @@ def fit_template(
             start and the end.
         road: the target.
         config: how the recording is placed, and how far it may be scaled and moved.
-        starts: (N, 3) or (N, 4) start poses x [m], y [m], yaw [rad], and speeds [m/s] of all
-            vehicles; with `goals`.
-        goals: the same for the end.
         request: the start and end states that are requested for some vehicles.
         limits: of motion; no requested state may exceed a planned speed.
 
@@ -242,8 +237,7 @@ def fit_template(
         LostEncounterError: the best place on the road has a loss that `config.allow` does not
             name.
         RefusedError: the recording does not fit, or a requested state is impossible.
-        InputError: `starts` and `goals` disagree with the encounter, or a named vehicle does not
-            exist.
+        InputError: a named vehicle does not exist.
 
     Examples:
         >>> import scenario_gen as sg
@@ -259,9 +253,6 @@ def fit_template(
     request.ego_of(encounter)  # refuses an unknown vehicle
     if request.moves:
         return _fit_request(situation, segmentation, road, config, request, limits)
-    if starts is not None or goals is not None:
-        placement, given = place_given(situation, road, config, starts, goals)
-        return assemble_fit(situation, segmentation, road, placement, config, given)
     placement = _place(situation, road.cleared, config)
     fit = assemble_fit(situation, segmentation, road, placement, config)
     losses = [loss for loss in fit.losses if loss.kind == "light" or not placement.at_home]

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.curve import Curve
@@ -94,8 +94,8 @@ def place_given(
     situation: Situation,
     road: Road,
     config: FittingConfig,
-    starts: Floats | None,
-    goals: Floats | None,
+    starts: Floats,
+    goals: Floats,
     base: Placement | None = None,
 ) -> tuple[Placement, Floats]:
     """Map every vehicle's start to the given start, and its end to the given goal.
@@ -108,8 +108,7 @@ def place_given(
         situation: of the recording.
         road: the target.
         config: which scales are accepted.
-        starts: (N, 3) or (N, 4) x, y [m], yaw [rad], and speed [m/s]; a speed that is NaN or
-            missing is the recorded one.
+        starts: (N, 4) x, y [m], yaw [rad], speed [m/s]; a speed that is NaN is the recorded one.
         goals: the same for the end.
         base: another placement. With it, a row of NaN means the state there; a vehicle without a
             given state keeps its path there.
@@ -118,22 +117,17 @@ def place_given(
         The placement, and (N, 2, 4) the start and end states; NaN for vehicles as in `base`.
 
     Raises:
-        InputError: shapes disagree with the encounter, or a value is not finite.
         RefusedError: a scale is out of range, or a vehicle that waits throughout is asked to move.
     """
     encounter, tracks = situation.encounter, situation.tracks
-    may_be_free = base is not None
-    states = np.stack(
-        (
-            _checked_states("starts", starts, encounter, 0, may_be_free=may_be_free),
-            _checked_states("goals", goals, encounter, -1, may_be_free=may_be_free),
-        ),
-        axis=1,
-    )
-    is_given: Bools = np.isfinite(states[..., 0])
-    ends = states
+    ends = np.stack((starts, goals), axis=1)
+    is_given: Bools = np.isfinite(ends[..., 0])
+    ends[..., 3] = np.where(np.isnan(ends[..., 3]), _end_speeds(encounter), ends[..., 3])
     if base is not None:
-        ends = np.where(is_given[..., None], states, _end_states(base, encounter))
+        poses = np.stack([track.poses[[0, -1]] for track in base.tracks])
+        speed = _end_speeds(encounter, base.scale[:, None])
+        base_ends = np.concatenate((poses, speed[..., None]), axis=-1)
+        ends = np.where(is_given[..., None], ends, base_ends)
     joint = _Similarity.of_all(tracks, ends)
     placed: list[Track] = []
     scale, moved = np.ones(len(tracks)), np.zeros(len(tracks))
@@ -156,41 +150,10 @@ def _note(track: Track, is_given: Bools, method: str) -> Note:
     return Note.of(NoteKind.STATE_GIVEN, vehicle=track.vehicle.id, states=states, method=method)
 
 
-def _end_states(base: Placement, encounter: Encounter) -> Floats:
-    """Return (N, 2, 4) the start and end states of a placement."""
-    poses = np.stack([track.poses[[0, -1]] for track in base.tracks])
-    speed = encounter.speed[:, [0, -1]] * base.scale[:, None]
-    speed = np.where(speed < STANDING_SPEED_MPS, 0.0, speed)
-    return np.concatenate((poses, speed[..., None]), axis=-1)
-
-
-def _checked_states(
-    name: str, given: Floats | None, encounter: Encounter, sample: int, *, may_be_free: bool
-) -> Floats:
-    """Return (N, 4) given states with the recorded speed where none is given.
-
-    Free rows are NaN.
-    """
-    count = len(encounter.vehicles)
-    if given is None:
-        raise InputError(f"{name} is missing; give both starts and goals, or neither")
-    states = np.asarray(given, dtype=np.float64)
-    if states.ndim != 2 or states.shape[0] != count or states.shape[1] not in (3, 4):
-        raise InputError(
-            f"{name} has shape {states.shape}; one row of x, y, yaw and optionally speed per "
-            f"vehicle ({count}) is needed"
-        )
-    is_free = np.isnan(states).all(axis=1) & may_be_free
-    recorded = encounter.speed[:, sample]
-    speed = np.where(recorded < STANDING_SPEED_MPS, 0.0, recorded)
-    if states.shape[1] == 4:
-        given_speed = states[:, 3]
-        speed = np.where(np.isnan(given_speed) & may_be_free, speed, given_speed)
-    states = np.column_stack((states[:, :3], speed))
-    if not np.isfinite(states[~is_free]).all() or (states[~is_free, 3] < 0.0).any():
-        raise InputError(f"{name} has a value that is not finite, or a negative speed")
-    states[is_free] = np.nan
-    return states
+def _end_speeds(encounter: Encounter, scale: Floats | float = 1.0) -> Floats:
+    """Return the scaled speeds (N, 2) [m/s] at both ends; 0 for vehicles that stand."""
+    speed = encounter.speed[:, [0, -1]] * scale
+    return np.where(speed < STANDING_SPEED_MPS, 0.0, speed)
 
 
 @dataclass(frozen=True)

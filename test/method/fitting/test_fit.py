@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.lengths import LOGS
 
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.fitting.state_check import refuse_misfits
@@ -17,7 +17,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.situation import find_conflicts
-from scenario_gen.types import Encounter, Motion, Vehicle
+from scenario_gen.types import Encounter, Motion, Request, Vehicle
 from scenario_gen.types.fit import Segmentation
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates
@@ -285,23 +285,36 @@ def test_scale_out_of_range_is_refused():
     assert fit.requested.start[0, 3] == pytest.approx(12.0 * fit.fitted[0].scale)
 
 
-def test_given_ends_are_met_exactly():
-    encounter = crossing_pair()
-    road = Road(
-        "open",
-        np.ones((1000, 1000), dtype=bool),
-        0.2,
-        np.zeros(2),
-        np.zeros((0, 3)),
-        np.zeros((0, 3)),
+def open_ground(cells):
+    return Road(
+        "open", np.ones((cells, cells), bool), 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
     )
+
+
+def requested(encounter, starts, goals):
+    """Ask for start and goal states of all vehicles."""
+    texts = [
+        ";".join(
+            f"{vehicle.id}:" + " ".join(map(repr, row))
+            for vehicle, row in zip(encounter.vehicles, rows.tolist(), strict=True)
+        )
+        for rows in (starts, goals)
+    ]
+    return Request(starts=texts[0], goals=texts[1])
+
+
+def test_requested_ends_are_met_exactly():
+    encounter = crossing_pair()
+    road = open_ground(1000)
     chord = np.hypot(*(encounter.position[:, -1] - encounter.position[:, 0]).T)
     starts = np.array([[30.0, 100.0, 0.3, 9.0], [100.0, 60.0, 1.8, 6.0]])
     goals = starts.copy()
     for i in (0, 1):
         goals[i, :2] += 1.1 * chord[i] * np.array([np.cos(starts[i, 2]), np.sin(starts[i, 2])])
     goals[:, 3] = (9.0, 7.0)
-    fit = fit_template(encounter, every(encounter), road, starts=starts, goals=goals)
+    allowed = FittingConfig(allow="lost_conflict")
+    request = requested(encounter, starts, goals)
+    fit = fit_template(encounter, every(encounter), road, allowed, request=request)
     assert np.abs(fit.requested.start - starts).max() < 1e-8
     assert np.abs(fit.requested.end - goals).max() < 1e-8
     assert [f.scale for f in fit.fitted] == pytest.approx([1.1, 1.1], abs=0.01)
@@ -309,24 +322,21 @@ def test_given_ends_are_met_exactly():
         along = np.hypot(*(fit.fitted[i].anchors[:, :2] - starts[i, :2]).T)
         own = np.hypot(*(encounter.position[i, fit.anchor_index] - encounter.position[i, 0]).T)
         assert along == pytest.approx(1.1 * own, abs=0.15)
+    far = goals.copy()
+    far[:, :2] = starts[:, :2] + 2.0 / 1.1 * (goals[:, :2] - starts[:, :2])
     with pytest.raises(RefusedError, match=r"scale 2\.0"):
-        far = goals.copy()
-        far[:, :2] = starts[:, :2] + 2.0 / 1.1 * (goals[:, :2] - starts[:, :2])
-        fit_template(encounter, every(encounter), road, starts=starts, goals=far)
-    for bad in (
-        {"starts": starts},
-        {"starts": starts[:1], "goals": goals},
-        {"starts": starts * np.nan, "goals": goals},
-    ):
-        with pytest.raises(InputError):
-            fit_template(encounter, every(encounter), road, **bad)
+        fit_template(
+            encounter,
+            every(encounter),
+            open_ground(2000),
+            request=requested(encounter, starts, far),
+        )
 
 
 def test_waiting_vehicle_cannot_be_sent_away():
-    still = np.zeros(100)
     encounter = encounter_of(
         driven(straight(-30.0, 0.0, 0.0), np.full(100, 6.0)),
-        driven(straight(0.0, -9.0, np.pi / 2.0), still),
+        driven(straight(0.0, -9.0, np.pi / 2.0), np.zeros(100)),
     )
     fit = fit_template(encounter, every(encounter), build_road("four_way", encounter))
     assert fit.fitted[1].manoeuvre == "wait"
@@ -334,23 +344,10 @@ def test_waiting_vehicle_cannot_be_sent_away():
     assert (fit.fitted[1].anchors == fit.fitted[1].anchors[0]).all()
     moving, waiting = (f.anchors[0] for f in fit.fitted)
     assert relative(moving, waiting) == pytest.approx([30.0, -9.0], abs=2.5)
-    road = Road(
-        "open",
-        np.ones((600, 600), dtype=bool),
-        0.2,
-        np.zeros(2),
-        np.zeros((0, 3)),
-        np.zeros((0, 3)),
-    )
     starts = np.array([[20.0, 60.0, 0.0], [60.0, 40.0, 1.5]])
+    away = requested(encounter, starts, starts + np.array([59.0, 0.0, 0.0]))
     with pytest.raises(RefusedError, match="waits throughout"):
-        fit_template(
-            encounter,
-            every(encounter),
-            road,
-            starts=starts,
-            goals=starts + np.array([59.0, 0.0, 0.0]),
-        )
+        fit_template(encounter, every(encounter), open_ground(700), request=away)
 
 
 def test_anchors_move_near_not_far():
