@@ -7,7 +7,6 @@ What does not fit as a whole is shortened, and with the road `AUTO` several road
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -22,7 +21,7 @@ from scenario_gen.method.sampling import Callbacks, Plan, sample_scenarios, Targ
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.shortening import fitting_part
 from scenario_gen.method.suitable_roads import AUTO, refuse_lost_conflicts, suitable_roads
-from scenario_gen.roads import road_and_template
+from scenario_gen.roads import road_and_template, windows_on_map
 from scenario_gen.situation import refuse_reversing, refuse_too_large, Situation, Wait
 from scenario_gen.types import (
     causes_in_words,
@@ -161,13 +160,10 @@ class Generation:
             if not fitting.shorten or self.request.moves or isinstance(error, TargetError):
                 raise
             refusal = error
-        if self.road != AUTO:  # most parts that do not fit can be told from their plans
-            _, planned, note = fitting_part(self.plan, encounter, refusal, fitting)
-            with suppress(RefusedError):
-                return self.draw(*planned, count).noted(note)
-        single = partial(self.of_whole, count=1)
-        part, _, note = fitting_part(single, encounter, refusal, fitting)
-        return self.of_whole(part, count).noted(note)
+        attempt = partial(self.of_whole, count=count)
+        windows = windows_on_map(self.road, encounter) if self.road != AUTO else ()
+        _, result, note = fitting_part(attempt, encounter, refusal, fitting, windows)
+        return result.noted(note)
 
     def of_whole(self, encounter: Encounter, count: int) -> GenerationResult:
         """Return scenarios of an encounter as it is.

@@ -4,14 +4,15 @@
 """A recording that is too long for a road is shortened to its interaction, as little as possible.
 
 Each vehicle's track may lose its begin and its end, as long as all conflicts, orders, reactions,
-waits and turns remain (`interaction_windows`). Four ways are tried, the one with the smallest
-loss first: the same time for all vehicles; then other ends; then other begins, too; and at last
-the beginning of a braking may be lost. If the shortest part does not fit, no longer one is tried.
-What the road has room for is then given back, in quarters.
+waits and turns remain (`interaction_windows`). On a map it is cut to where the lanes reach. Else
+the shortest part tells whether shortening helps; then longer ones are tried, the one with the
+smallest loss first: the same time for all vehicles, in quarters; then a time for each; and at last
+the beginning of a braking may be lost.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain, islice, product
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -29,6 +30,9 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import Encounter, Note, NoteKind, YIELD
 
+_COMMON_LOSS_SHARE = (0.25, 0.5, 0.75, 1.0)  # of what all vehicles can lose
+_PROPOSED_COUNT = 2  # places on a map for which a part is tried
+
 Made = TypeVar("Made")
 
 
@@ -37,6 +41,7 @@ def fitting_part(
     encounter: Encounter,
     refusal: RefusedError,
     config: FittingConfig = FittingConfig(),
+    windows: Sequence[Floats] = (),
 ) -> tuple[Encounter, Made, Note]:
     """Return the part of a recording that fits with the smallest loss, and a note on it.
 
@@ -47,12 +52,13 @@ def fitting_part(
         encounter: the recording.
         refusal: why the whole does not fit.
         config: what is kept before and after the interaction.
+        windows: (N, 2) [s] each, which the road is long enough for, the best first.
 
     Raises:
         RefusedError: the refusal, with the lanes that the shortest form needs: it does not fit.
     """
     search = _Search(attempt, Situation.of(encounter), config)
-    part = search.shortest_loss()
+    part = search.shortest_loss(windows)
     if part is None:
         search.add_remedy(refusal)
         raise refusal
@@ -100,23 +106,21 @@ class _Search(Generic[Made]):
     refusals: list[tuple[Encounter, RefusedError]] = field(default_factory=list)
     made: list[Made] = field(default_factory=list)
 
-    def shortest_loss(self) -> Encounter | None:
+    def shortest_loss(self, windows: Sequence[Floats]) -> Encounter | None:
         """Return the recording with the smallest loss found; None if it does not fit shortened."""
-        encounter = self.situation.encounter
-        whole = encounter.time[encounter.present]
-        ways = list(self._ways(whole))
-        if not ways:
-            return None
-        tightest = self._fitting(ways[-1])
+        ways = list(self._ways())
+        for way in islice(self._proposed(windows, ways[-2:]), _PROPOSED_COUNT):
+            if best := self._fitting(way):
+                return best
+        tightest = self._fitting(ways[-1]) if ways else None
         if tightest is None:  # the others are longer
             return None
-        for way in ways[:-1]:
-            if best := self._fitting(way):
-                return self._restored(whole, best, way)
-        return self._restored(whole, tightest, ways[-1])
+        return next(filter(None, map(self._fitting, ways[:-1])), tightest)
 
-    def _ways(self, whole: Floats) -> Iterator[_Way]:
+    def _ways(self) -> Iterator[_Way]:
         """Yield the ways of shortening that keep the interaction, the longest first."""
+        encounter = self.situation.encounter
+        whole = encounter.time[encounter.present]
         each, braking = (
             interaction_windows(
                 self.situation, self.config.lead, self.config.follow_up, whole_braking=kept
@@ -124,38 +128,23 @@ class _Search(Generic[Made]):
             for kept in (True, False)
         )
         common = np.tile((each[:, 0].min(), each[:, 1].max()), (len(each), 1))
-        ways = [
-            _Way(common, True),
-            _Way(np.column_stack((common[:, 0], each[:, 1])), True),
-            _Way(each, True),
-            _Way(braking, False),
-        ]
+        ways = [_Way(whole + share * (common - whole), True) for share in _COMMON_LOSS_SHARE]
+        ways += [_Way(each, True), _Way(braking, False)]
         for k, way in enumerate(ways):
             new = not any(np.array_equal(way.windows, other.windows) for other in ways[:k])
             shortens = np.abs(way.windows - whole).max() >= MIN_LOSS_S
             if new and shortens and self._part(way) is not None:
                 yield way
 
-    def _restored(self, whole: Floats, best: Encounter, way: _Way) -> Encounter:
-        """Return the fitting part with the smallest share of a way's change of the windows.
-
-        First the begins are restored as far as possible, then the ends: to all, half or a quarter.
-        """
-        change = way.windows - whole
-        shares = np.ones(2)
-        for end in (0, 1):
-            lowest, highest = 0.0, 1.0
-            for step in range(3):
-                share = 0.0 if step == 0 else (lowest + highest) / 2.0
-                tried = np.where(np.arange(2) == end, share, shares)
-                part = self._fitting(_Way(whole + tried * change, way.whole_braking))
-                if part is None:
-                    lowest = share
-                    continue
-                best, shares, highest = part, tried, share
-                if step == 0:
-                    break
-        return best
+    def _proposed(self, windows: Sequence[Floats], needed: Sequence[_Way]) -> Iterator[_Way]:
+        """Yield the windows that contain what is needed, if possible the same for all vehicles."""
+        common = [
+            np.tile((each[:, 0].max(), each[:, 1].min()), (len(each), 1)) for each in windows
+        ]
+        pairs = list(zip(common, windows, strict=True))
+        for way, proposed in product(needed, chain.from_iterable(pairs)):
+            if ((way.windows - proposed) * (1.0, -1.0)).min() >= 0.0:
+                yield _Way(proposed, way.whole_braking)
 
     def add_remedy(self, refusal: RefusedError) -> None:
         """Add to a refusal the lanes that the shortest form of the recording needs."""

@@ -3,20 +3,18 @@
 
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
-from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.build import (
     build_road,
     BUILT_IN,
     CORRIDOR,
-    DrawRoad,
     road_and_template,
     ROADS,
     ROUNDABOUT,
+    windows_on_map,
 )
 from scenario_gen.roads.clearance import (
     CONTACT_CELLS,
     footprint_fits,
-    free_length,
     nearest_pose_with_room,
     segment_free,
     segments_free,
@@ -29,8 +27,7 @@ from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.junctions import drives_about_ring
 from scenario_gen.roads.lights import lights_of
 from scenario_gen.roads.obstacles import read_obstacles
-from scenario_gen.roads.pavement import drivable_width
-from scenario_gen.roads.plan import Arm, Connection, Driven, Plan, ways_through
+from scenario_gen.roads.plan import Arm, Plan
 from scenario_gen.roads.room import has_room, max_repair, share_with_room
 from scenario_gen.roads.vector.candidate import PlaceLimits
 from scenario_gen.roads.vector.ground import (
@@ -39,7 +36,7 @@ from scenario_gen.roads.vector.ground import (
     ground_for,
     own_side,
 )
-from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph, LanePath
+from scenario_gen.roads.vector.lane_graph import lane_graph, LanePath
 from scenario_gen.roads.vector.place import (
     best_place,
     find_places,
@@ -59,11 +56,7 @@ __all__ = [
     "ROADS",
     "ROUNDABOUT",
     "Arm",
-    "Connection",
-    "DrawRoad",
-    "Driven",
     "FreeSpace",
-    "LaneGraph",
     "LanePath",
     "NoPlaceError",
     "Place",
@@ -76,18 +69,15 @@ __all__ = [
     "build_road",
     "draw_plan",
     "draw_route",
-    "drivable_width",
     "drives_about_ring",
     "drives_against",
     "find_places",
     "footprint_fits",
     "free_cells",
-    "free_length",
     "free_space",
     "ground_for",
     "has_room",
     "is_vector_map",
-    "lane_along",
     "lane_graph",
     "lights_of",
     "max_repair",
@@ -100,10 +90,9 @@ __all__ = [
     "segment_free",
     "segments_free",
     "share_with_room",
-    "sharing_lanes",
     "split",
     "to_cells",
     "to_metres",
     "users_of",
-    "ways_through",
+    "windows_on_map",
 ]

@@ -3,7 +3,6 @@
 
 """Roads by name or path: built-in, drawn around a recording, or read from a map."""
 
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -14,6 +13,7 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
+from scenario_gen.numerics import Floats
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.corridor import draw_corridor
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
@@ -22,6 +22,7 @@ from scenario_gen.roads.obstacles import parked_cars, read_obstacles, with_obsta
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.pavement import ARM_COUNT
 from scenario_gen.roads.shaped import draw_along, draw_merge, draw_paper, fitting_width, main_shape
+from scenario_gen.roads.vector.place import windows_on_lanes
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
 from scenario_gen.situation import (
     mirrored,
@@ -102,31 +103,30 @@ def road_and_template(
     refuse_reversing(encounter)
     if isinstance(name_or_path, Road):
         return name_or_path, encounter
-    name_or_path = str(name_or_path) if isinstance(name_or_path, Path) else name_or_path
-    refusal: RefusedError | None = None
-    try:
-        road = build_road(name_or_path, encounter, config)
-    except RefusedError as error:
-        network = _vector_network(name_or_path)
-        if network is None or not _drives_on_other_side(encounter, network):
-            raise
-        refusal = error
-    else:
-        if road.map_lanes is None or not _drives_on_other_side(encounter, road.map_lanes):
-            return road, encounter
-
+    network = _vector_network(str(name_or_path))
+    if network is None or not _drives_on_other_side(encounter, network):
+        return build_road(name_or_path, encounter, config), encounter
     other = mirrored(encounter)
-    with suppress(RefusedError):
-        mirrored_road = build_road(name_or_path, other, config)
-        lanes = mirrored_road.map_lanes
-        if lanes is not None and _drives_on_other_side(encounter, lanes):
-            side = lanes.traffic_side
-            note = Note.of(NoteKind.MIRRORED, road=mirrored_road.name, side=side)
-            noted = replace(lanes, notes=(note, *lanes.notes))
-            return replace(mirrored_road, lanes=noted), other
-    if refusal is not None:
-        raise refusal
-    return road, encounter
+    try:
+        road = build_road(name_or_path, other, config)
+    except RefusedError:
+        return build_road(name_or_path, encounter, config), encounter
+    assert road.lanes is not None
+    note = Note.of(NoteKind.MIRRORED, road=road.name, side=network.traffic_side)
+    return replace(road, lanes=replace(road.lanes, notes=(note, *road.lanes.notes))), other
+
+
+def windows_on_map(name_or_path: Road | Path | str, encounter: Encounter) -> list[Floats]:
+    """Return windows (N, 2) [s] in which a recording is on lanes of a map, the best place first.
+
+    There are none for another road, and where the lanes are long enough.
+    """
+    network = None if isinstance(name_or_path, Road) else _vector_network(str(name_or_path))
+    if network is None:
+        return []
+    if _drives_on_other_side(encounter, network):
+        encounter = mirrored(encounter)
+    return windows_on_lanes(network, Situation.of(encounter).tracks)
 
 
 def _vector_network(name: str) -> LaneNetwork | None:

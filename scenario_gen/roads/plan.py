@@ -15,7 +15,7 @@ from scenario_gen.numerics.plane import unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.ways import reverse
 from scenario_gen.situation import Track
-from scenario_gen.types import DrawnFor, Note, Road, TrafficLight, Trailer
+from scenario_gen.types import DrawnFor, Note, TrafficLight, Trailer
 
 
 class Connection(NamedTuple):
@@ -141,19 +141,3 @@ def aligned(
     ids = {key: lane_id(*arm_and_lane, inward=key[1]) for key, arm_and_lane in lane_of.items()}
     lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
     return DrawnFor(frame, lanes)
-
-
-def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
-    """Return the routes through a drawn road, by the indices of its entry and its exit.
-
-    They lead from the end of the entry's lane to that of the exit's lane.
-    """
-    if road.lanes is None or not road.lanes.drawn:
-        return {}
-    network, ways = road.lanes, {}
-    for entry, first in enumerate(network.entries):
-        for way in network.lanes[first].successors:
-            (last,) = network.lanes[way].successors
-            line = np.concatenate([network.lanes[k].centre for k in (first, way, last)])
-            ways[entry, network.exits.index(last)] = Curve.through(line)
-    return ways

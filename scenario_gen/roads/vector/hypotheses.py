@@ -52,6 +52,7 @@ class Hypothesis:
             the directions or swerves are left out.
         swerve: (N, T) [m, left positive] recorded offsets from the lanes; None: there are none.
         ends: ids of the lanes by which each vehicle enters and leaves, "" for any; () for all.
+        may_begin_before: whether a vehicle may begin before the first lane on its way.
     """
 
     cost: float
@@ -60,6 +61,7 @@ class Hypothesis:
     extra: float = 0.0
     swerve: Floats | None = None
     ends: tuple[tuple[str, str], ...] = ()
+    may_begin_before: bool = False
 
 
 def recorded_poses(tracks: Sequence[Track]) -> Floats:
@@ -365,7 +367,5 @@ def _straight_chain(graph: LaneGraph, first: int, span: float) -> LaneChain:
 
 def _turn_of_lane(graph: LaneGraph, lane: int) -> float:
     """Return the absolute angle [rad] between the first and the last edge of a lane's centre."""
-    centre = graph.network.lanes[lane].centre
-    first, last = centre[1] - centre[0], centre[-1] - centre[-2]
-    cross = first[0] * last[1] - first[1] * last[0]
-    return abs(float(np.arctan2(cross, first[0] * last[0] + first[1] * last[1])))
+    yaw = graph.network.lanes[lane].yaw
+    return abs(float(wrap_angle(yaw[-1] - yaw[0])))

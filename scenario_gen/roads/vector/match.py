@@ -11,7 +11,7 @@ between vehicles in one lane stay as recorded.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, islice, product
+from itertools import combinations, islice, product, starmap
 import math
 from typing import NamedTuple
 
@@ -64,6 +64,7 @@ class Match:
             ends force (`lateral_acceleration`).
         off_reserved_cost: [m²] the extra cost of vehicles that leave their reserved lanes.
         lost_crossings: recorded crossings that both vehicles drive to, and these lanes lack.
+        windows: (N, 2) [s] in which the vehicles are on their paths, if only these are too short.
     """
 
     paths: tuple[LanePath, ...]
@@ -72,6 +73,7 @@ class Match:
     forced_lateral: float = 0.0
     off_reserved_cost: float = 0.0
     lost_crossings: int = 0
+    windows: Floats | None = None
 
 
 class _Candidate(NamedTuple):
@@ -112,7 +114,11 @@ def match(
         ends = hypothesis.ends[n] if hypothesis.ends else ("", "")
         if prefer_reserved and graph.reserved_for(track):  # the named lanes are for cars
             ends = "", ""
-        path = _lane_path(graph, track, poses, scale, ends, prefer_reserved=prefer_reserved)
+        on_way = poses if hypothesis.may_begin_before else poses[:1]
+        firsts = next(filter(None, map(graph.near, on_way)), [])
+        path = _lane_path(
+            graph, track, poses, scale, firsts, ends, prefer_reserved=prefer_reserved
+        )
         if path is None:
             yield Match((), math.inf, _NO_LANES.format(track.vehicle.id))
             return
@@ -151,6 +157,7 @@ def _lane_path(
     track: Track,
     poses: Floats,
     scale: float,
+    firsts: Sequence[int],
     ends: tuple[str, str],
     *,
     prefer_reserved: bool,
@@ -168,7 +175,7 @@ def _lane_path(
         bonus = COSTS.not_reserved_m2 * reserved_share(candidate)
         return round(candidate.cost - bonus, 6), candidate.chain
 
-    ranked = sorted(_candidates(graph, track, poses, driven, ends), key=rank)
+    ranked = sorted(_candidates(graph, track, poses, driven, firsts, ends), key=rank)
     if not ranked:
         return None
     best = ranked[0]
@@ -179,15 +186,20 @@ def _lane_path(
 
 
 def _candidates(
-    graph: LaneGraph, track: Track, poses: Floats, driven: float, ends: tuple[str, str]
+    graph: LaneGraph,
+    track: Track,
+    poses: Floats,
+    driven: float,
+    firsts: Sequence[int],
+    ends: tuple[str, str],
 ) -> Iterator[_Candidate]:
-    """Yield the chains from lanes near the first pose, or from the lane with the id `ends[0]`."""
+    """Yield the chains from the first lanes, or from the lane with the id `ends[0]`."""
     closed = graph.closed_to(track)
-    firsts, lasts = (
+    named, lasts = (
         {k for k, lane in enumerate(graph.network.lanes) if name and lane.id == name}
         for name in ends
     )
-    starts = sorted(firsts) or [k for k in graph.near(poses[0]) if k not in closed]
+    starts = sorted(named) or [k for k in firsts if k not in closed]
     chains = (chain for k in starts for chain in graph.chains_from(k, driven, closed))
     chains = (chain for chain in chains if not ends[1] or lasts.intersection(chain))
     for chain in dict.fromkeys(islice(chains, LIMITS.chains)):
@@ -406,8 +418,8 @@ def _judged(
     cost += COSTS.lost_crossing_m2 * (len(lost) - sum(lost))
     lateral = [lateral_acceleration(path, track) for path, track in driven]
     cost += speeding_cost(graph.network, paths, tracks) + bend_cost(lateral)
-    reasons = [reason for path, track in driven for reason in _missing_length(path, track)]
-    reasons += [
+    short = [reason for path, track in driven for reason in _missing_length(path, track)]
+    reasons = short + [
         f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
         for each, track in zip(lateral, tracks, strict=True)
         if each.forced > LIMITS.grip_mps2
@@ -419,6 +431,7 @@ def _judged(
         max(each.forced for each in lateral),
         off_reserved_cost(graph, paths, tracks),
         sum(lost),
+        np.array(list(starmap(_window_on, driven))) if reasons and reasons == short else None,
     )
 
 
@@ -430,6 +443,15 @@ def _missing_length(path: LanePath, track: Track) -> Iterator[str]:
         yield _NO_LANES.format(track.vehicle.id)
     elif short > 0.0:
         yield f"the lanes of vehicle {track.vehicle.id} are {short:.1f} m too short"
+
+
+def _window_on(path: LanePath, track: Track) -> tuple[float, float]:
+    """Return from when to when [s] the footprint of a vehicle is on its lane path."""
+    half = track.vehicle.length / 2.0 + LIMITS.end_room_m
+    ends = np.array([half, path.curve.length - half]) - path.start
+    first = int(np.searchsorted(path.progress, ends[0]))
+    stop = int(np.searchsorted(path.progress, ends[1], side="right"))
+    return first * track.dt, (stop - 1) * track.dt
 
 
 def _resemblance_cost(path: LanePath, poses: Floats) -> float:

@@ -11,7 +11,7 @@ recording most is the first.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import islice
+from itertools import chain, islice
 import math
 
 import numpy as np
@@ -43,6 +43,7 @@ _MATCHED_STREETS_COUNT = 8
 _JUDGED_COUNT = 40  # candidates with all losses before others are not looked for
 _LOSING_COUNT = 6  # candidates that lose something and are compared
 _SCALED_COUNT = 16  # hypotheses of a batch that are tried with other scales
+_SHORT_BATCHES_COUNT = 2  # of hypotheses, where the recording is too long
 _TRIED_ROOM_COUNT = 12  # candidates whose room is looked at
 _HOME_COST_M2 = 1.0  # of a hypothesis that is where the recording was made
 _MAX_COST_M2 = 40.0  # of a match
@@ -106,22 +107,26 @@ class _Search(PlacingTask):
             yield [*first, *along, *rigid[part], *crossed[part]], scales
             first = []
 
-    def candidates(self, hypothesis: Hypothesis) -> Iterator[Candidate]:
-        """Yield the matches that resemble a hypothesis; the others become failures."""
+    def matches(self, hypothesis: Hypothesis) -> Iterator[Match]:
+        """Yield the matches that resemble a hypothesis."""
         stop_if_cancelled()
         for prefer_reserved in (True, False) if self.has_reserved else (False,):
-            for each in match(
+            yield from match(
                 self.graph, self.drivers, self.met, hypothesis, prefer_reserved=prefer_reserved
-            ):
-                reason = each.reason
-                if each.cost > _MAX_COST_M2 and not hypothesis.ends:
-                    reason = reason or _TOO_FAR
-                elif reason:
-                    self.unscaled.append(hypothesis)
-                if reason:
-                    self.failures.append((True, each.cost, reason))
-                else:
-                    yield Candidate(each, hypothesis, self)
+            )
+
+    def candidates(self, hypothesis: Hypothesis) -> Iterator[Candidate]:
+        """Yield the matches that can be used; the others become failures."""
+        for each in self.matches(hypothesis):
+            reason = each.reason
+            if each.cost > _MAX_COST_M2 and not hypothesis.ends:
+                reason = reason or _TOO_FAR
+            elif reason:
+                self.unscaled.append(hypothesis)
+            if reason:
+                self.failures.append((True, each.cost, reason))
+            else:
+                yield Candidate(each, hypothesis, self)
 
     def good_ones(self, batch: Sequence[Hypothesis]) -> Iterator[Candidate]:
         """Yield the candidates near some hypotheses that are good, in order of `rank`."""
@@ -201,6 +206,28 @@ def find_places(
     yield from losing
     if not has_place and not losing:
         raise NoPlaceError(_refusal(search))
+
+
+def windows_on_lanes(network: LaneNetwork, tracks: tuple[Track, ...]) -> list[Floats]:
+    """Return in which time the tracks of a recording are on lanes that are too short for it.
+
+    Returns:
+        Windows (N, 2) [s], the longest first, then those of the place that resembles it most.
+    """
+    search = _Search(lane_graph(network, users_of(drivers_of(tracks))), tracks, PlaceLimits())
+    row_of = {track.vehicle.id: row for row, track in enumerate(tracks)}
+    rows = [row_of[track.vehicle.id] for track in search.drivers]
+    whole = np.array([track.present * track.dt for track in tracks])
+    ranked: list[tuple[int, float, float, Floats]] = []
+    for batch, _ in islice(search.batches(None), _SHORT_BATCHES_COUNT):
+        partly = [replace(each, may_begin_before=True) for each in batch]
+        for each in chain.from_iterable(map(search.matches, partly)):
+            if each.windows is not None and each.cost <= _MAX_COST_M2:
+                windows = whole.copy()
+                windows[rows] = np.clip(each.windows, whole[rows, :1], whole[rows, 1:])
+                lost = float(np.abs(windows - whole).sum())
+                ranked.append((each.lost_crossings, round(lost), each.cost, windows))
+    return [windows for *_, windows in sorted(ranked, key=lambda row: row[:3])]
 
 
 def _refusal(search: _Search) -> str:
