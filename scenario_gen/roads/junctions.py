@@ -27,7 +27,6 @@ from scenario_gen.roads.junction_arms import (
     find_arms,
     junction_centre,
     lanes_of_arm,
-    SURE_LENGTH_M,
 )
 from scenario_gen.roads.lights import recorded_lights
 from scenario_gen.roads.pavement import END_ROOM_M, JUNCTION_SLACK_M, MIN_ARM_M
@@ -210,83 +209,51 @@ def _ring_for_speed(tracks: tuple[Track, ...]) -> _Ring:
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
     """Draw a roundabout with one lane, sized for the recorded speeds, with arms where needed.
 
-    A recorded ring is drawn as it was, if cars can drive around it as fast.
+    A recorded ring is drawn as it was, if cars can drive around it as fast. If the vehicles drive
+    too fast for a ring, or would not leave it, each arm is long enough for the recording.
 
     Raises:
-        RefusedError: the recorded vehicles drive too fast for it, side by side, or use more than
-            four arms.
+        RefusedError: the recorded vehicles use more than four arms.
     """
     if encounter is None:
         ring = _Ring(np.zeros(2), _RING.min_radius_m)
-        directions = [ArmDirection(k * np.pi / 2.0, []) for k in range(4)]
-        return draw_plan(_ring_plan(name, config, ring, directions, ()), name, config)
+        return draw_plan(_ring_plan(name, config, ring, _regular_arms(), ()), name, config)
 
     situation = Situation.of(encounter)
     tracks = situation.drivers
     config = fitting_width(tracks, config)
     recorded = _recorded_ring(tracks, config)
     ring = recorded or _ring_for_speed(tracks)
-    _refuse_speed(ring)
+    notes = () if recorded else (Note.of(NoteKind.NO_RING, radius=ring.radius),)
     directions = find_arms(name, tracks, ring.centre, ring.radius + _RING.near_ring_m)
-    if recorded is None:
-        _refuse_short_paths(tracks, directions, ring)
-    for direction in directions:
-        _refuse_parallel_lanes(direction, config)
+    if recorded is None and not _suits_ring(tracks, directions, ring):
+        length = float(
+            np.hypot(*np.ptp(np.concatenate([track.poses for track in tracks]), axis=0)[:2])
+        )
+        longer = replace(
+            config, arm_length=config.arm_length or ring.radius + length + 2.0 * END_ROOM_M
+        )
+        plan = _ring_plan(name, longer, ring, _regular_arms(), tracks)
+        return draw_plan(replace(plan, notes=notes), name, config)
     plan = _ring_plan(name, config, ring, directions, tracks)
     lane_of = {end.key: (a, 0) for a, arm in enumerate(directions) for end in arm.ends}
     used = {arm for (_, inward), (arm, _) in lane_of.items() if inward}
     yielding = set(range(len(plan.arms))) - used | _yielding_arms(situation, lane_of, config)
-    notes = () if recorded else (Note.of(NoteKind.NO_RING, radius=ring.radius),)
     frame = _westwards(ring.centre, directions[0])
     drawn_for = aligned(tracks, lane_of, frame)
     plan = replace(plan, yielding=yielding, notes=notes, drawn_for=drawn_for)
     return draw_plan(plan, name, config)
 
 
-def _refuse_short_paths(
-    tracks: tuple[Track, ...], directions: list[ArmDirection], ring: _Ring
-) -> None:
-    """Refuse vehicles whose whole path would be on the ring.
+def _regular_arms() -> list[ArmDirection]:
+    return [ArmDirection(k * np.pi / 2.0, []) for k in range(4)]
 
-    Raises:
-        RefusedError: there is one.
-    """
+
+def _suits_ring(tracks: tuple[Track, ...], directions: list[ArmDirection], ring: _Ring) -> bool:
+    """Return whether vehicles can drive around a ring as fast as recorded, and get to its arms."""
     reaching = {end.vehicle for direction in directions for end in direction.ends}
-    if any(not track.still and i not in reaching for i, track in enumerate(tracks)):
-        raise RefusedError(
-            f"road roundabout: the recorded paths are too short for its ring (radius "
-            f"{ring.radius:.0f} m for {ring.speed:.1f} m/s)"
-        )
-
-
-def _refuse_speed(ring: _Ring) -> None:
-    """Refuse a ring on which vehicles cannot drive as fast as they were recorded.
-
-    Raises:
-        RefusedError: it is one.
-    """
-    if ring.speed > np.sqrt(_RING.max_lateral_mps2 * ring.radius):
-        possible = float(np.sqrt(_RING.max_lateral_mps2 * _RING.max_radius_m))
-        raise RefusedError(
-            f"road roundabout: the recorded vehicles drive up to {ring.speed:.1f} m/s where the "
-            f"ring would be; the largest one ({_RING.max_radius_m:g} m) allows {possible:.1f} m/s"
-        )
-
-
-def _refuse_parallel_lanes(direction: ArmDirection, config: RoadConfig) -> None:
-    """Refuse vehicles that drive side by side on an arm of a roundabout.
-
-    Raises:
-        RefusedError: they do.
-    """
-    straight = [end for end in direction.ends if end.steady >= 2.0 * SURE_LENGTH_M]
-    lanes = lanes_of_arm(replace(direction, ends=straight), config)
-    outermost = max(lanes.lane_of.values(), default=0)
-    if outermost > 0 and len({end.inward for end in direction.ends}) < 2:
-        raise RefusedError(
-            f"road roundabout has one lane; the recorded vehicles use {outermost + 1} parallel "
-            "lanes"
-        )
+    moving = {i for i, track in enumerate(tracks) if not track.still}
+    return moving <= reaching and ring.speed**2 <= _RING.max_lateral_mps2 * ring.radius
 
 
 def _ring_plan(

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place, unit
@@ -37,6 +37,7 @@ from scenario_gen.situation import (
 from scenario_gen.types import Encounter, Road, YIELD
 
 _RAMP_ANGLE_RAD = np.radians(12.0)
+_RAMP_CURVATURE_PER_M = 0.02  # of the bend into the main road, without a recorded one
 _MAX_RAMP_LATERAL_MPS2 = 2.5  # at the recorded speed
 _MIN_CURVE_RAD = np.radians(20.0)  # of the road `curve`
 _LANE_MARGIN_M = 0.4  # on each side of the widest vehicle
@@ -152,17 +153,27 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
                         ramp    /    /
                            /    /
 
+    Vehicles that change from the outermost lane of their direction, in which nobody stays, to the
+    next come from the ramp. Without any, the ramp is beside the main road.
+
     Raises:
-        RefusedError: no recorded vehicle changes from the outermost lane of its direction to the
-            next, others stay in it, or the recording needs a junction.
+        RefusedError: the recording needs a junction.
     """
     if encounter is None:
-        return draw_plan(_merge_plan(1, (2.0 * MIN_ARM_M,) * 3, 0.02, config)[0], name, config)
+        return draw_plan(
+            _merge_plan(1, (2.0 * MIN_ARM_M,) * 3, _RAMP_CURVATURE_PER_M, config)[0], name, config
+        )
     situation = Situation.of(encounter)
     tracks = situation.drivers
     config = fitting_width(tracks, config)
     frenet = to_frenet(tracks)
     merging = _merging_vehicles(frenet)
+    if not merging:
+        low, high = frenet.span(tracks)
+        half = max((high - low) / 2.0 + END_ROOM_M + JUNCTION_SLACK_M, MIN_ARM_M)
+        lengths = half, half, 2.0 * MIN_ARM_M
+        plan, _ = _merge_plan(frenet.spread().lanes, lengths, _RAMP_CURVATURE_PER_M, config)
+        return draw_plan(plan, name, config)
     on_main_road = frenet.lane[[i for i in range(len(tracks)) if i not in merging]]
     lanes = max(int(on_main_road.max(initial=0)), int(frenet.lane[merging, 1].max())) + 1
 
@@ -175,11 +186,11 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     fastest = max(float(tracks[i].speed[k]) for i, k in samples.items())
     sharpest = max(sharpness_of(tracks[i]) for i in merging)
     sharpest = min(sharpest, _MAX_RAMP_LATERAL_MPS2 / max(fastest, 1.0) ** 2)
-    lengths = (
+    recorded_lengths = (
         max(length + END_ROOM_M + JUNCTION_SLACK_M, MIN_ARM_M)
         for length in (join - low, high - join, join - first)
     )
-    plan, on_road = _merge_plan(lanes, tuple(lengths), sharpest, config)
+    plan, on_road = _merge_plan(lanes, tuple(recorded_lengths), sharpest, config)
 
     rows = driver_rows(encounter)
     yields = {rows.get(edge.who) for edge in situation.reactions.edges if edge.kind == YIELD}
@@ -227,8 +238,7 @@ def _merge_plan(
 def _merging_vehicles(frenet: FrenetTracks) -> list[int]:
     """Return the vehicles that leave the outermost lane of their direction for the next one.
 
-    Raises:
-        RefusedError: there is none, or others stay in the outermost lane.
+    There are none if others stay in the outermost lane.
     """
     for sign in (1, -1):
         vehicles = np.flatnonzero(frenet.direction == sign)
@@ -237,7 +247,4 @@ def _merging_vehicles(frenet: FrenetTracks) -> list[int]:
         merges = (lanes[:, 0] == outermost) & (lanes[:, 1] < outermost)
         if merges.any() and not (lanes[~merges] == outermost).any():
             return [int(vehicle) for vehicle in vehicles[merges]]
-    raise RefusedError(
-        "road merge: no recorded vehicle changes from the outermost lane of its direction to the "
-        "next one, so none would use the ramp"
-    )
+    return []
