@@ -12,13 +12,12 @@ can really make, and two cells of one component are connected by a path.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-import math
 
 import numpy as np
 from scipy import ndimage
 
 from scenario_gen.numerics import Floats, Ints, sealed
-from scenario_gen.roads.clearance import segment_free, segments_free, to_metres
+from scenario_gen.roads.clearance import segments_free, to_metres
 from scenario_gen.types import Road
 
 
@@ -40,15 +39,6 @@ class FreeSpace:
 
         It is 0 if the disc collides or is walled in.
         """
-        road = self.road
-        u, v = (float(xy[axis] - road.origin[axis]) / road.resolution for axis in range(2))
-        column, row = math.floor(u), math.floor(v)
-        height, width = self.labels.shape
-        if 0 <= row < height and 0 <= column < width and self.labels[row, column] > 0:
-            # Nearly always the centre of the cell itself can be reached.
-            radius = self.radius / road.resolution
-            if segment_free(road.clearance_cells, u, v, column + 0.5, row + 0.5, radius):
-                return int(self.labels[row, column])
         return next(self._reachable(np.asarray(xy, dtype=np.float64)), 0)
 
     def common_component(self, start_xy: Floats, goal_xy: Floats) -> int | None:

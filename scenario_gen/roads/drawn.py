@@ -378,10 +378,7 @@ class _RoadDrawing:
         """Return the route between the ends of two lanes; None if cars cannot drive it."""
         a, i, b, j = connection
         start = self._plan.arms[a].lane(i, self._config, inward=True)
-        goal = self._plan.arms[b].lane(j, self._config, inward=False)
-        if abs(angle_between(goal[2], start[2])) > _MAX_TURN_RAD:
-            return None
-        return draw_route(start, goal)
+        return _possible_route(start, self._plan.arms[b].lane(j, self._config, inward=False))
 
     def _route(self, connection: Connection) -> Curve | None:
         """Return the route between two lanes at their mouths; None if cars cannot drive it."""
@@ -403,9 +400,7 @@ class _RoadDrawing:
         at_a, at_b = np.array([self._mouths[a]]), np.array([self._mouths[b]])
         start = self._lines[a].at_offset(at_a, -self._sign * start_offset)[0]
         goal = reverse(self._lines[b].at_offset(at_b, self._sign * goal_offset)[0])
-        if abs(angle_between(goal[2], start[2])) > _MAX_TURN_RAD:
-            return None
-        route = draw_route(start, goal, max_curvature=max_curvature)
+        route = _possible_route(start, goal, max_curvature)
         return None if route is None else route.cut(0.0, route.length, _ROUTE_STEP_M)
 
     def _widening(self, route: Curve) -> Floats | float:
@@ -441,6 +436,15 @@ class _RoadDrawing:
         left = border(1.0, start.left[-1], goal.left[0])
         right = border(-1.0, start.right[-1], goal.right[0])
         return Lane(f"{start.id}>{goal.id}", left, right, junction="1")
+
+
+def _possible_route(
+    start: Floats, goal: Floats, max_curvature: float = MAX_CAR_CURVATURE_PER_M
+) -> Curve | None:
+    """Return the route between two poses (3,); None if it is too sharp."""
+    if abs(angle_between(goal[2], start[2])) > _MAX_TURN_RAD:
+        return None
+    return draw_route(start, goal, max_curvature=max_curvature)
 
 
 def _straight_length(route: Curve) -> float:

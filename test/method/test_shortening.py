@@ -110,7 +110,7 @@ def test_braking_is_lost_last(crossing: Encounter) -> None:
     assert keeps_interaction(situation, Situation.of(part), whole_braking=False)
 
 
-def test_a_part_reaches_as_far_as_lanes(crossing: Encounter) -> None:
+def test_part_reaches_as_far_as_lanes(crossing: Encounter) -> None:
     situation = Situation.of(crossing)
     whole = crossing.time[crossing.present]
     needed, shorter = (

@@ -7,7 +7,7 @@ Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 
@@ -28,7 +28,7 @@ from scenario_gen.roads.vector.drafts import (
     refuse_too_many_lanes,
     speed_of,
 )
-from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
+from scenario_gen.roads.vector.signs import DraftRule, is_speed_limit, kind_of_sign
 from scenario_gen.types import (
     CARS,
     DRIVERS,
@@ -37,7 +37,6 @@ from scenario_gen.types import (
     NoteKind,
     Obstacle,
     RuleKind,
-    SignalSchedule,
 )
 
 _USERS_BY_TYPE = {
@@ -54,7 +53,6 @@ _USERS_BY_NAME = {
     **{name: frozenset((name,)) for name in LANE_USERS - CARS},
 }
 _MOTORWAY_TYPES = frozenset(("interstate", "highway"))
-_SPEED_LIMIT_SIGNS = frozenset(("274", "274.1", "R2-1", "maxSpeed"))
 
 
 @dataclass(frozen=True)
@@ -195,33 +193,24 @@ class _Map:
                 yield _obstacle_of(obstacle)
 
     @cached_property
-    def rule_kinds(self) -> dict[tuple[str, str], RuleKind]:
-        """The meanings of signs and lights, by the tag of references to them and their ids."""
-        kinds: dict[tuple[str, str], RuleKind] = {}
+    def signs_and_lights(self) -> dict[tuple[str, str], DraftRule]:
+        """Rules without lanes, by the tag of references to them and their ids."""
+        rules: dict[tuple[str, str], DraftRule] = {}
         for sign in self.root.findall("trafficSign"):
             known = [kind for kind in map(kind_of_sign, _sign_names(sign)) if kind is not None]
+            name = sign.get("id", "?")
             if known:
-                kinds["trafficSignRef", sign.get("id", "?")] = known[0]
+                rules["trafficSignRef", name] = DraftRule(name, known[0], ())
         for light in self.root.findall("trafficLight"):
-            kinds["trafficLightRef", light.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
-        return kinds
-
-    @cached_property
-    def schedules(self) -> dict[str, SignalSchedule | None]:
-        """The cycles of lights by their ids; None: a light has no states."""
-        schedules: dict[str, SignalSchedule | None] = {}
-        for light in self.root.findall("trafficLight/cycle/.."):
-            with self.faults.leaving_out("traffic light", light.get("id", "?")):
-                name, step_s = light.attribute("id"), self.root.number("timeStepSize", 0.1)
-                schedules[name] = cycle_of(light, step_s)
-        return schedules
-
-    @cached_property
-    def turns(self) -> dict[str, tuple[str, ...]]:
-        """The movements that lights are for, by their ids."""
-        return {
-            light.get("id", "?"): turns_of(light) for light in self.root.findall("trafficLight")
-        }
+            name, schedule = light.get("id", "?"), None
+            with self.faults.leaving_out("traffic light", name):
+                if light.find("cycle") is not None:
+                    schedule = cycle_of(light, self.root.number("timeStepSize", 0.1))
+            kind, turns = RuleKind.TRAFFIC_LIGHT, turns_of(light)
+            rules["trafficLightRef", name] = DraftRule(
+                name, kind, (), schedule=schedule, turns=turns
+            )
+        return rules
 
     def rules(self) -> Iterator[DraftRule]:
         """Yield a rule for each sign and light to which a lanelet for cars refers."""
@@ -238,11 +227,9 @@ class _Map:
             for path in (tag, f"stopLine/{tag}")
             for link in lanelet.findall(path)
         ]
-        for ref in dict.fromkeys(refs):
-            if ref in self.rule_kinds:
-                kind, schedule = self.rule_kinds[ref], self.schedules.get(ref[1])
-                turns = self.turns.get(ref[1], ())
-                yield DraftRule(ref[1], kind, (name,), line=line, schedule=schedule, turns=turns)
+        known = [ref for ref in dict.fromkeys(refs) if ref in self.signs_and_lights]
+        for ref in known:
+            yield replace(self.signs_and_lights[ref], lanes=(name,), line=line)
 
     def notes(self) -> Iterator[Note]:
         """Yield the notes on the file."""
@@ -305,7 +292,7 @@ def _sign_names(sign: Element) -> list[str]:
 
 
 def _is_known_sign(name: str) -> bool:
-    return name in _SPEED_LIMIT_SIGNS or kind_of_sign(name) is not None
+    return is_speed_limit(name) or kind_of_sign(name) is not None
 
 
 def _speed_limit_of_sign(element: Element) -> float:
@@ -317,7 +304,7 @@ def _speed_limit_of_sign(element: Element) -> float:
         InputError: its value is not a speed.
     """
     kind, value = element.find("trafficSignID"), element.find("additionalValue")
-    if kind is None or value is None or kind.content not in _SPEED_LIMIT_SIGNS:
+    if kind is None or value is None or not is_speed_limit(kind.content):
         return math.nan
     limit = speed_of(value.content, "m/s")
     if math.isnan(limit):

@@ -24,7 +24,7 @@ MAX_LANES_COUNT = 30_000
 MAX_LINKS_COUNT = 100
 """From one lane to its successors, or to its neighbours."""
 
-_MPS_PER_UNIT = {
+MPS_PER_UNIT = {
     "km/h": 1.0 / 3.6,
     "kmh": 1.0 / 3.6,
     "kph": 1.0 / 3.6,
@@ -32,6 +32,7 @@ _MPS_PER_UNIT = {
     "m/s": 1.0,
     "mps": 1.0,
 }
+"""By the name of a unit of speed."""
 
 
 class TooLargeError(InputError):
@@ -209,4 +210,4 @@ def speed_of(text: str, unit: str) -> float:
     match = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]+)?)\s*([a-zA-Z/]*)\s*", text[:40])
     if match is None:
         return math.nan
-    return float(match[1]) * _MPS_PER_UNIT.get(match[2].lower() or unit, math.nan)
+    return float(match[1]) * MPS_PER_UNIT.get(match[2].lower() or unit, math.nan)

@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 import math
 import re
 
@@ -262,15 +263,10 @@ class LaneletMap:
         refuse_too_long(sum(len(self.ways[ref]) for ref in refs), self.file)
         for_cars = {ref for each in self.car_lanelets for ref in self.borders.get(each.id, ())}
         nodes_of = {ref: self._nodes_of(ref) for ref in refs}
-        central: dict[str, None] = {}  # in the order of the file
-        for ref, nodes in nodes_of.items():
-            if ref in for_cars:
-                central |= dict.fromkeys(nodes)
-        for nodes in self.stop_lines.values():
-            central |= dict.fromkeys(nodes)
-        used = dict(central)
-        for nodes in nodes_of.values():
-            used |= dict.fromkeys(nodes)
+        of_cars = [nodes for ref, nodes in nodes_of.items() if ref in for_cars]
+        # Both are in the order of the file.
+        central = dict.fromkeys(chain(*of_cars, *self.stop_lines.values()))
+        used = dict.fromkeys(chain(central, *nodes_of.values()))
         elements = [self.nodes[name] for name in used]
         return positions_of(elements, len(central), self.file, self.faults)
 
@@ -314,18 +310,15 @@ class LaneletMap:
         Raises:
             InputError: there is not exactly one, or it is not in the map.
         """
-        members = [
-            member for member in lanelet.element.findall("member") if member.get("role") == role
-        ]
-        if len(members) != 1:
+        refs, where = lanelet.members(role), lanelet.element.place
+        if len(refs) != 1:
             raise InputError(
-                f"{lanelet.element.place}: lanelet {lanelet.id} has {len(members)} members with "
-                f"role {role}; one is needed"
+                f"{where}: lanelet {lanelet.id} has {len(refs)} members with role {role}; one is "
+                "needed"
             )
-        ref = members[0].attribute("ref")
-        if ref not in self.ways:
-            raise InputError(f"{members[0].place}: way {ref} is not in the map")
-        return ref
+        if refs[0] not in self.ways:
+            raise InputError(f"{where}: way {refs[0]} is not in the map")
+        return refs[0]
 
     def _nodes_of(self, ref: str) -> list[str]:
         """Return the nodes of a way.
@@ -393,7 +386,7 @@ class LaneletMap:
         texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
         for text in (*texts, *(sign.get("subtype", "") for sign in signs)):
             sign_name = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
-            limit = float(sign_name[1]) * _KMH_FACTOR if sign_name else speed_of(text, "km/h")
+            limit = speed_of(sign_name[1] if sign_name else text, "km/h")
             if not math.isnan(limit):
                 return limit
         return math.nan

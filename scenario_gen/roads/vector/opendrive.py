@@ -26,6 +26,7 @@ from scenario_gen.roads.vector.drafts import (
     MapLanes,
     MAX_LINKS_COUNT,
     MAX_SECTIONS_COUNT,
+    MPS_PER_UNIT,
     refuse_too_long,
     refuse_too_many_lanes,
     TooLargeError,
@@ -42,7 +43,6 @@ from scenario_gen.roads.vector.sections import (
 )
 from scenario_gen.types import DRIVERS, Note, NoteKind
 
-_MPS_PER_UNIT = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 _MAX_LINK_GAP_M = 3.0  # between the ends of linked lanes
 _UNCROSSED_MARKS = frozenset(("solid", "solid solid", "curb", "grass", "botts dots"))
 
@@ -319,8 +319,8 @@ def _speed_limit(road: OpenDriveRoad, lane: Element, s: float) -> float:
     if not records or records[0].get("max") in ("no limit", "undefined", None):
         return math.nan
     unit = records[0].get("unit", "m/s")
-    if unit not in _MPS_PER_UNIT:
-        units = ", ".join(_MPS_PER_UNIT)
+    if unit not in MPS_PER_UNIT:
+        units = ", ".join(MPS_PER_UNIT)
         raise InputError(f"{records[0].place}: unit {unit[:20]!r}; choose one of {units}")
     limit = records[0].number("max")
-    return limit * _MPS_PER_UNIT[unit] if limit > 0.0 else math.nan
+    return limit * MPS_PER_UNIT[unit] if limit > 0.0 else math.nan

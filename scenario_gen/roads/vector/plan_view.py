@@ -188,22 +188,21 @@ def _spiral(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, 
 
 def _poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:
     """v(u) = a + b·u + c·u² + d·u³; u is interpolated from a table of arc lengths."""
-    a, b, c, d = (shape.number(name) for name in "abcd")
+    v = _cubic(shape)
     u = np.linspace(0.0, max(length, 1e-6), max(math.ceil(length / 0.05), 1) + 1)
-    v = a + u * (b + u * (c + u * d))
-    arc = running_sum(np.hypot(np.diff(u), np.diff(v)))
-    at = np.interp(ds, arc, u)
-    return at, a + at * (b + at * (c + at * d)), np.arctan(b + at * (2.0 * c + at * 3.0 * d))
+    at = np.interp(ds, running_sum(np.hypot(np.diff(u), np.diff(v(u)))), u)
+    return at, v(at), np.arctan(v.deriv()(at))
 
 
 def _param_poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:
     p = ds / length if _is_normalized(shape, length) and length > 0.0 else ds
-    values, slopes = [], []
-    for axis in "UV":
-        a, b, c, d = (shape.number(f"{name}{axis}") for name in "abcd")
-        values.append(a + p * (b + p * (c + p * d)))
-        slopes.append(b + p * (2.0 * c + p * 3.0 * d))
-    return values[0], values[1], np.asarray(np.arctan2(slopes[1], slopes[0]))
+    u, v = _cubic(shape, "U"), _cubic(shape, "V")
+    return u(p), v(p), np.arctan2(v.deriv()(p), u.deriv()(p))
+
+
+def _cubic(shape: Element, axis: str = "") -> np.poly1d:
+    """Return the cubic of a shape along an axis."""
+    return np.poly1d([shape.number(f"{name}{axis}") for name in "dcba"])
 
 
 def _is_normalized(shape: Element, length: float) -> bool:

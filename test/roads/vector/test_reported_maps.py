@@ -12,7 +12,6 @@ from test_crossings import meet
 from test_rules import crossing, template
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.logs import geodesy
 from scenario_gen.roads import find_places, lane_graph, read_network
 from scenario_gen.roads.vector.signs import kind_of_sign
 from scenario_gen.situation import clean_tracks
@@ -274,15 +273,6 @@ def test_bridge_traffic_meets_nobody_below(tmp_path, suffix):
         RefusedError, match="vehicles 1 and 2 would be above each other, as on a bridge"
     ):
         next(find_places(lane_graph(above), tracks))
-
-
-def test_map_on_180th_meridian_is_whole(tmp_path):
-    def place(x, y):
-        latitude, longitude = geodesy.geodetic(np.array([x, y]), (-17.0, 180.0))
-        return f'lat="{float(latitude)!r}" lon="{float(longitude)!r}">'
-
-    network = read_network(write(tmp_path, ".osm", lanelet2(place)))
-    assert np.allclose(network.box, [[-60.0, -60.0], [60.0, 60.0]], atol=0.02)
 
 
 def test_places_beyond_shortlist_are_tried(tmp_path, monkeypatch):

@@ -107,6 +107,8 @@ def test_types_and_users_of_commonroad_lanelets(tmp_path, inner, own):
     text = commonroad().replace("<laneletType>urban</laneletType>", inner, 1)
     network = read_network(write(tmp_path, ".xml", text))
     assert users(network) == own
+    lanes = {one.id: one for one in network.whole.lanes}
+    assert all(np.allclose(lanes[k].centre, lanes["100"].centre[::-1]) for k in own if k == "100r")
     assert any(note.kind is NoteKind.UNUSED_LANES for note in network.notes) == (
         "restricted" in inner
     )
@@ -131,13 +133,22 @@ def test_types_and_users_of_commonroad_lanelets(tmp_path, inner, own):
             '<access rule="deny"><restriction type="passengerCar"/></access>',
             "bicycle,bus,motorcycle,truck",
         ),
+        ("driving", '<access rule="deny" restriction="none"/>', ""),
+        (
+            "driving",
+            '<access rule="allow" restriction="bus"/><access rule="allow" restriction="passengerCar"/>',
+            "bus,car,van",
+        ),
         ("driving", '<access rule="allow" restriction="emergency"/>', None),
         ("shoulder", "", None),
     ],
 )
 def test_types_and_access_of_opendrive_lanes(tmp_path, kind, access, own):
     network = read(tmp_path, road(section(right=lane(-1) + lane(-2, kind, more=access))))
-    assert users(network) == ({} if own is None else {"1.0.-2": own})
+    assert users(network) == ({"1.0.-2": own} if own else {})
+    assert any(note.kind is NoteKind.OTHER_LANES for note in network.notes) == bool(
+        own and "car" not in own.split(",")
+    )
     assert len(network.whole.lanes) == (1 if own is None else 2)
 
 
