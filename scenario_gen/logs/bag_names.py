@@ -19,7 +19,7 @@ from scenario_gen.logs.growing import Span
 from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.numerics import Ints
 
-_BODY_FRAMES = ("base_link", "base_footprint", "base", "body", "chassis")
+BODY_FRAMES = ("base_link", "base_footprint", "base", "body", "chassis")
 _BETTER_NAMES = (
     "filtered",
     "fused",
@@ -43,7 +43,7 @@ AnyTopic = TypeVar("AnyTopic", bound=_Named)
 def child_vehicle(frame: str) -> str:
     """Return the vehicle of a body frame: `car_a/base_link` and `car_a_base_link` are car_a."""
     name = frame.strip("/")
-    for body in _BODY_FRAMES:
+    for body in BODY_FRAMES:
         shorter = name.removesuffix(f"/{body}").removesuffix(f"_{body}")
         if shorter != name:
             return shorter
@@ -211,14 +211,11 @@ def clock_doubts(clocks: Sequence[TopicClock], *, is_part: bool) -> list[Doubt]:
 
 def _clock_doubt(cause: str, size: float) -> Doubt:
     return Doubt(
-        "",
-        0.0,
-        0.0,
         Quantity.CLOCK,
         size,
-        "s",
         f"the header {cause}",
         "--set log.stamps=received uses the recorder's clock",
+        unit="s",
         stops=size >= _MAX_CLOCK_DIFFERENCE_S,
     )
 

@@ -59,26 +59,27 @@ def doubts_of_pieces(pieces: Sequence[Piece], origin_ns: int) -> Iterator[Doubt]
         limit = max(_LIMITS.moved_m, _LIMITS.moved_noise_factor * smooth.noise)
         for start, end, distance in _stretches(fix_s, smooth.moved > limit, smooth.moved):
             yield Doubt(
+                Quantity.POSITION,
+                distance,
+                f"the motion of a car that fits best is up to {distance:.1f} m off the fixes",
+                "check the time column and the units",
                 piece.track.id,
                 start,
                 end,
-                Quantity.POSITION,
-                distance,
                 "m",
-                f"the motion of a car that fits best is up to {distance:.1f} m off the fixes",
-                "check the time column and the units",
             )
         speed_s = (piece.track.speed_ns - origin_ns).astype(np.float64) * 1e-9
         for start, end, difference in _stretches(speed_s, ~smooth.believed, np.abs(smooth.before)):
             yield Doubt(
+                Quantity.SPEED,
+                difference,
+                "speed column ignored, since it contradicts the positions by up to "
+                f"{difference:.1f} m/s",
+                "",
                 piece.track.id,
                 start,
                 end,
-                Quantity.SPEED,
-                difference,
                 "m/s",
-                "speed column ignored, since it contradicts the positions by up to "
-                f"{difference:.1f} m/s",
                 stops=False,
             )
 
@@ -112,7 +113,7 @@ def doubts_of_rows(log: RawLog, drops: Drops, config: LogConfig) -> Iterator[Dou
             remedy = "name the column that tells them apart: --set log.columns=scene=…"
             if log.separators:
                 remedy = with_columns(config.columns, {"scene": log.separators[0]})
-        yield Doubt(name, 0.0, 0.0, Quantity.ROWS, share, "", cause, remedy)
+        yield Doubt(Quantity.ROWS, share, cause, remedy, name)
 
 
 def copies_in(encounters: Sequence[Encounter]) -> dict[str, Doubt]:
@@ -131,7 +132,7 @@ def copies_in(encounters: Sequence[Encounter]) -> dict[str, Doubt]:
                 "are read as one vehicle"
             )
             copies[names[second]] = Doubt(
-                names[second], 0.0, 0.0, Quantity.VEHICLE, distance, "m", cause, stops=False
+                Quantity.VEHICLE, distance, cause, vehicle=names[second], unit="m", stops=False
             )
     return copies
 

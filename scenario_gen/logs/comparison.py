@@ -3,7 +3,7 @@
 
 """The quantities of each vehicle compared with each other, as recorded or in another reading."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -257,6 +257,12 @@ class Reading:
         """Return the vehicles with which a reading is tried."""
         return self.log.vehicles[:: max(len(self.log.vehicles) // _MAX_TRIED_COUNT, 1)]
 
+    def agreeing(
+        self, changes: Iterable[Change], agrees: Callable[[Comparison], bool]
+    ) -> list[Change]:
+        """Return the changes with which the quantities of vehicles agree."""
+        return [change for change in changes if agrees(self.compared(change.convert))]
+
     def compared(self, convert: Convert = lambda vehicle: vehicle) -> Comparison:
         """Compare the quantities of vehicles, after a change."""
         vehicles = self.tried()
@@ -276,8 +282,7 @@ class Reading:
         stops: bool = True,
     ) -> None:
         """Add a doubt about the whole log."""
-        doubt = Doubt("", 0.0, 0.0, quantity, size, "", cause, remedy)
-        self.doubts.append(replace(doubt, stops=stops))
+        self.doubts.append(Doubt(quantity, size, cause, remedy, stops=stops))
 
 
 def counts_steps(vehicles: Sequence[Observations]) -> bool:

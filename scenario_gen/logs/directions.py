@@ -85,7 +85,7 @@ def _agreeing_changes(reading: Reading, quantity: str) -> list[Change]:
     """Return the conventions of headings, or else of axes, with which all directions agree."""
     conventions = list(_conventions(reading))
     mirrors = list(_mirrors(reading))
-    changes = _agreeing(reading, conventions) if quantity == "heading" else []
+    changes = reading.agreeing(conventions, _directions_agree) if quantity == "heading" else []
     if changes:
         is_turned = changes[0].columns == reading.units("north_rad", "heading")
         return changes + [m for m in mirrors if is_turned and m.columns.keys() == {"x", "y"}]
@@ -96,7 +96,8 @@ def _agreeing_changes(reading: Reading, quantity: str) -> list[Change]:
         clockwise = with_heading(lambda heading: -np.radians(heading))
         text = "headings are counted clockwise, in degrees"
         both.append(Change(text, columns, clockwise, is_unit=False))
-    return _agreeing(reading, mirrors) or _agreeing(reading, both)
+    agreeing = reading.agreeing(mirrors, _directions_agree)
+    return agreeing or reading.agreeing(both, _directions_agree)
 
 
 def _without_body_frames(reading: Reading) -> Comparison:
@@ -115,14 +116,9 @@ def _without_body_frames(reading: Reading) -> Comparison:
     return reading.compared()
 
 
-def _agreeing(reading: Reading, changes: list[Change]) -> list[Change]:
-    """Return the changes with which all directions agree."""
-    agreeing = []
-    for change in changes:
-        compared = reading.compared(change.convert)
-        if not (compared.contradicts("heading_off") or compared.contradicts("course_off")):
-            agreeing.append(change)
-    return agreeing
+def _directions_agree(compared: Comparison) -> bool:
+    """Return whether all directions agree with the displacements."""
+    return not (compared.contradicts("heading_off") or compared.contradicts("course_off"))
 
 
 def _conventions(reading: Reading) -> Iterator[Change]:

@@ -215,7 +215,6 @@ def _vehicle_quality(
         longest_cut=float(cuts.seconds[cuts.gaps].max(initial=0.0)),
         reversals=int((cuts.reversals & ~cuts.gaps).sum()) + extra_reversals,
         speed_before=rms("before"),
-        speed_after=rms("after"),
         moved=rms("moved"),
         noise=max((smooth.noise for smooth in smooths), default=np.nan),
         lost=lost_s,

@@ -12,7 +12,7 @@ names, and said; else it is a `Doubt` with the option for it (`Reading.resolve`)
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 
@@ -348,7 +348,8 @@ def _check_speeds(reading: Reading) -> None:
         _check_pairs(reading, compared)
         return
     ratio = float(np.median(ratios))
-    changes = _agreeing(reading, [*_frame_rates(reading), *_units(reading)])
+    changes = reading.agreeing(chain(_frame_rates(reading), _units(reading)), _speeds_agree)
+    changes = _distinct(changes)
     if changes:
         is_named = not any(reading.is_assumed(*change.columns) for change in changes)
         positions_decide = is_named and set(changes[0].columns) == {"speed"}
@@ -415,17 +416,12 @@ def _extent(fix: Floats) -> float:
     return float(np.hypot(*sides)) if np.isfinite(sides).all() else -1.0
 
 
-def _agreeing(reading: Reading, changes: Sequence[Change]) -> list[Change]:
-    """Return the changes with which the speeds of nearly all vehicles agree."""
-    agreeing = []
-    for change in changes:
-        compared = reading.compared(change.convert)
-        ratios = compared.deviation[np.isfinite(compared.ratio)]
-        fits = len(ratios) and (ratios < EVIDENCE.same_ratio).mean() >= EVIDENCE.agreeing_share
-        is_possible = _typical_speed(compared) < EVIDENCE.max_speed_mps
-        if fits and is_possible and not compared.contradicts("speed_off"):
-            agreeing.append(change)
-    return _distinct(agreeing)
+def _speeds_agree(compared: Comparison) -> bool:
+    """Return whether the speeds of nearly all vehicles agree with their positions."""
+    ratios = compared.deviation[np.isfinite(compared.ratio)]
+    fits = len(ratios) and (ratios < EVIDENCE.same_ratio).mean() >= EVIDENCE.agreeing_share
+    is_possible = _typical_speed(compared) < EVIDENCE.max_speed_mps
+    return bool(fits and is_possible and not compared.contradicts("speed_off"))
 
 
 def _distinct(changes: Sequence[Change]) -> list[Change]:
@@ -455,14 +451,11 @@ def _units(reading: Reading) -> Iterator[Change]:
     """Yield the units, and the order of columns, that speeds may ask for."""
     if reading.has("time") and reading.log.columns["time"].counts_frames:
         return
-    if reading.has("speed"):
+    speeds = ("speed",) if reading.has("speed") else ("vx", "vy")
+    if reading.has(*speeds):
         for unit, name in _SPEED_UNITS.items():
-            columns = reading.units(unit, "speed")
+            columns = reading.units(unit, *speeds)
             yield Change(f"speeds are in {name}", columns, scaled(speed=UNITS["speed"][unit]))
-    elif reading.has("vx", "vy"):
-        for unit, name in _SPEED_UNITS.items():
-            columns = reading.units(unit, "vx", "vy")
-            yield Change(f"vx, vy are in {name}", columns, scaled(speed=UNITS["speed"][unit]))
     if reading.has("lat", "lon"):
         swap = reading.swapped("lat", "lon")
         yield Change("lat and lon are swapped", swap, with_fix(swapped_fix), is_unit=False)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenario_gen.bags.vehicles import Samples
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.bag_names import child_vehicle
+from scenario_gen.logs.bag_names import BODY_FRAMES, child_vehicle
 from scenario_gen.logs.config import POINTS
 from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import Observations
@@ -21,7 +21,6 @@ from scenario_gen.numerics import Floats, Ints, wrap_angle
 
 Complexes = NDArray[np.complex128]
 _MAX_DEPTH_COUNT = 20  # transforms in a chain; more are a circle
-_BODIES = ("base_link", "base_footprint", "base", "body", "chassis")
 _ODOMETRY_FRAME = "odom"
 _NORTH_FIRST = "ned"  # x north, y east, z down
 
@@ -104,8 +103,8 @@ def by_vehicle(recordings: Iterable[Recording]) -> dict[str, list[Recording]]:
 
 def bodies_of(recordings: Sequence[Recording]) -> list[Recording]:
     """Return the vehicles among transforms: frames called as bodies, else those in a root."""
-    bodies = [each for each in recordings if _last(each.child) in _BODIES]
-    bodies = bodies or [each for each in recordings if each.child.endswith(_BODIES)]
+    bodies = [each for each in recordings if _last(each.child) in BODY_FRAMES]
+    bodies = bodies or [each for each in recordings if each.child.endswith(BODY_FRAMES)]
     if bodies:
         return bodies
     children = {each.child.strip("/") for each in recordings}
@@ -274,4 +273,4 @@ def _frame_doubts(frames: Mapping[str, str]) -> list[Doubt]:
     if len(names) == 1:
         cause = f"an odometry counts from where its vehicle started ({listed})"
     remedy = "record /tf and /tf_static too, or positions in one frame such as map"
-    return [Doubt("", 0.0, 0.0, Quantity.FRAME, float(len(names)), "", cause, remedy)]
+    return [Doubt(Quantity.FRAME, float(len(names)), cause, remedy)]

@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from itertools import islice
 import math
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from scenario_gen.logs.kinds import counted
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.numerics import runs
 
+_MAX_PAIR_COUNT = 1_000  # that are compared
 _MAX_REACH_M = 1e6  # within which the nearest vehicles are named
 
 
@@ -56,7 +58,8 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
     reach = config.proximity
     near: list[_Approach] = []
     while not near and reach < _MAX_REACH_M:
-        near = [_approach(pieces[i], pieces[j], config) for i, j in near_pairs(pieces, 1, reach)]
+        pairs = islice(near_pairs(pieces, 1, reach), _MAX_PAIR_COUNT)
+        near = [_approach(pieces[i], pieces[j], config) for i, j in pairs]
         reach *= 8.0
     if not near:
         return f"{rule}: no two vehicles are recorded at the same time and place"

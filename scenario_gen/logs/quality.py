@@ -44,7 +44,6 @@ class VehicleQuality:
         longest_cut: the longest of them [s].
         reversals: stops at which the track was cut because the vehicle reversed.
         speed_before: RMS of measured speed minus speed of the raw positions [m/s].
-        speed_after: RMS of smooth speed minus speed of the smooth positions [m/s].
         moved: RMS distance between raw and smooth positions [m].
         noise: standard deviation of the fixes [m], estimated or given; determines smoothness.
         lost: seconds of pieces left out, since no motion of a car fits them.
@@ -61,7 +60,6 @@ class VehicleQuality:
     longest_cut: float
     reversals: int
     speed_before: float
-    speed_after: float
     moved: float
     noise: float = math.nan
     lost: float = 0.0
@@ -156,9 +154,8 @@ def _vehicle_line(vehicle: VehicleQuality) -> str:
     if not vehicle.smoothed:
         return f"{recorded}not smoothed, since it comes near no other vehicle"
     return (
-        f"{recorded}speed against position {vehicle.speed_before:.2f} → "
-        f"{vehicle.speed_after:.2f} m/s RMS, positions changed by {vehicle.moved:.2f} m RMS "
-        f"(noise of the fixes {vehicle.noise:.2f} m)"
+        f"{recorded}speed against position {vehicle.speed_before:.2f} m/s RMS, positions changed "
+        f"by {vehicle.moved:.2f} m RMS (noise of the fixes {vehicle.noise:.2f} m)"
     )
 
 
@@ -201,25 +198,25 @@ class Doubt:
     """A contradiction between the result of reading and the raw data.
 
     Attributes:
+        quantity: what is in doubt.
+        size: of the contradiction, in `unit`.
+        cause: the contradiction, and its likely cause.
+        remedy: the option that would read the log right; "" if unknown.
         vehicle: its id; "" if the doubt concerns the whole log.
         start: seconds since the log's first stamp.
         end: seconds since the log's first stamp; equal to `start` for the whole log.
-        quantity: what is in doubt.
-        size: of the contradiction, in `unit`.
         unit: of `size`, e.g. "m"; "" for a ratio.
-        cause: the contradiction, and its likely cause.
-        remedy: the option that would read the log right; "" if unknown.
         stops: whether it stops the reading, unless the parameter `allow` is `doubt`.
     """
 
-    vehicle: str
-    start: float
-    end: float
     quantity: Quantity
     size: float
-    unit: str
     cause: str
     remedy: str = ""
+    vehicle: str = ""
+    start: float = 0.0
+    end: float = 0.0
+    unit: str = ""
     stops: bool = True
 
     def __str__(self) -> str:

@@ -90,13 +90,14 @@ class Smooth:
         position: (T, 2) metres.
         heading: (T,) rad, unwrapped; NaN if the vehicle never moved and none is recorded.
         speed: (T,) m/s.
-        before: (S,) measured speed minus the speed of the raw fixes [m/s].
-        after: (T,) smooth speed minus the speed of the smooth positions [m/s].
+        before: (S,) measured speed minus the speed of the raw fixes [m/s], or 0.
         moved: (F,) distance between the raw fixes and the smooth positions [m]; empty if the
             piece is not smoothed.
         noise: standard deviation of the fixes [m], estimated or given.
         turned: (H,) recorded minus smooth headings [rad] while the vehicle moves.
         believed: (S,) whether each measured speed was used.
+
+    Before it is smoothed, its headings and its noise are NaN, and all speeds are believed.
     """
 
     first: int
@@ -104,7 +105,6 @@ class Smooth:
     heading: Floats
     speed: Floats
     before: Floats
-    after: Floats
     moved: Floats
     noise: float
     turned: Floats
@@ -140,29 +140,21 @@ def interpolated_piece(piece: Observations, origin_ns: int, config: LogConfig) -
         return None
     ticks = dt * np.arange(last - first + 1, dtype=np.float64)
     fix_t = fix_t - first * dt
-    fix_speed = speed_of_fixes(fix_t, piece.fix)
     speed_t = _seconds(piece.speed_ns, origin_ns) - first * dt
     speed = piece.speed
     if not len(speed):
         speed_t = fix_t
-        speed = fix_speed
-    difference = speed - np.interp(speed_t, fix_t, fix_speed)
-    noise = config.position_noise or estimated_noise(piece.fix)
-    agrees = _agreeing(speed_t, difference, max(DOUBTED_MPS, 5.0 * noise))
-    believed = agrees[: len(piece.speed)]
-    if agrees.sum() <= len(agrees) / 2.0:
-        believed = np.zeros_like(believed)
+        speed = speed_of_fixes(fix_t, piece.fix)
     return Smooth(
         first=first,
         position=np.column_stack([np.interp(ticks, fix_t, axis) for axis in piece.fix.T]),
         heading=np.full(len(ticks), np.nan),
         speed=np.interp(ticks, speed_t, speed),
-        before=difference,
-        after=np.zeros(0),
+        before=np.zeros(len(piece.speed)),
         moved=np.zeros(0),
-        noise=noise,
+        noise=np.nan,
         turned=np.zeros(0),
-        believed=believed,
+        believed=np.ones(len(piece.speed), dtype=bool),
     )
 
 
@@ -190,18 +182,21 @@ def smooth_piece(piece: Observations, raw: Smooth, origin_ns: int, config: LogCo
     held = _without_ends(stands, round(SMOOTHING.settling_s / dt))
     limits = (-config.braking_limit, config.acceleration_limit)
     motion = Motion(held, dt, config.jerk, *limits)
-    deviation = config.speed_noise
-    if not deviation:
-        deviation = float(np.clip(white_equivalent(raw.before), *SMOOTHING.speed_noise_mps))
+    fix_speed = speed_of_fixes(fix_t, piece.fix)
+    noise = config.position_noise or estimated_noise(piece.fix)
+    difference = piece.speed - np.interp(speed_t, fix_t, fix_speed)
+    believed = _agreeing(speed_t, difference, max(DOUBTED_MPS, 5.0 * noise))
+    if believed.sum() <= len(believed) / 2.0:
+        believed = np.zeros_like(believed)
     measured = []
-    if raw.believed.any():
-        deviations = np.full(int(raw.believed.sum()), deviation)
-        measured = [(speed_t[raw.believed], piece.speed[raw.believed], deviations, True)]
-    tick_fix_speed = np.interp(ticks, fix_t, speed_of_fixes(fix_t, piece.fix))
-    guess = _first_distances(ticks, stands, raw.speed, tick_fix_speed, fix_t)
+    if believed.any():
+        usual = np.clip(white_equivalent(difference), *SMOOTHING.speed_noise_mps)
+        deviations = np.full(int(believed.sum()), config.speed_noise or float(usual))
+        measured = [(speed_t[believed], piece.speed[believed], deviations, True)]
+    guess = _first_distances(ticks, stands, raw.speed, np.interp(ticks, fix_t, fix_speed), fix_t)
     is_moving = np.interp(fix_t, ticks, stands) < 0.5
 
-    fit = _fit_in_turn(piece, fix_t, motion, measured, guess, is_moving, raw.noise, config)
+    fit = _fit_in_turn(piece, fix_t, motion, measured, guess, is_moving, noise, config)
     distance, smooth_speed = motion.at_ticks(fit.coefficients)
     position, heading = fit.path.pose(distance)
     is_known = np.isfinite(piece.heading)
@@ -213,7 +208,8 @@ def smooth_piece(piece: Observations, raw: Smooth, origin_ns: int, config: LogCo
         position=position,
         heading=heading,
         speed=smooth_speed,
-        after=smooth_speed - speed_of_fixes(ticks, position),
+        before=difference,
+        believed=believed,
         moved=np.hypot(*(piece.fix - fit.path.pose(fit.distance)[0]).T),
         noise=fit.noise,
         turned=wrap_angle(piece.heading[rolling] - np.interp(fix_t[rolling], ticks, heading)),
