@@ -52,7 +52,7 @@ class Case:
         assert [path.name for path in target.parent.iterdir()] == ["out"]
 
 
-EVERY = 1 if LONG else 4
+EVERY = 1 if LONG else 8
 CASES = {
     "texts": (write_texts, True),
     "nothing_there": (write_texts, False),

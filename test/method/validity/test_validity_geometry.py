@@ -253,7 +253,7 @@ def beside_the_wall(rng, over):
 
 def test_footprint_turning_at_wall_is_exact():
     rng = np.random.default_rng(0)
-    for over in 10.0 ** rng.uniform(-6.0, -2.0, 3000 if LONG else 400):
+    for over in 10.0 ** rng.uniform(-6.0, -2.0, 3000 if LONG else 150):
         assert causes(beside_the_wall(rng, over), WALL) == [Cause.OFF_ROAD], over
         assert causes(beside_the_wall(rng, -over - 5e-4), WALL) == [], over
 

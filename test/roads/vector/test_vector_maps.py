@@ -5,7 +5,6 @@
 
 from dataclasses import replace
 import math
-import re
 
 import numpy as np
 import pytest
@@ -144,91 +143,54 @@ def test_map_too_large_to_draw_refused(tmp_path):
         build_road(str(write(tmp_path, ".xodr")), None, RoadConfig(max_cells=1000))
 
 
-BROKEN = [  # suffix, text, what is said, with its place
-    (".osm", "", "is empty"),
-    (".osm", "<osm/>", "none of its 0 lanelets"),
-    (".osm", "<OpenDRIVE/>", "the root of a Lanelet2 map is <osm>"),
-    (".xodr", "<osm/>", "the root of an OpenDRIVE map is <OpenDRIVE>"),
-    (".xml", "<osm/>", "the root of a CommonRoad file is <commonRoad>"),
-    (".xml", "<commonRoad/>", "no lane for cars"),
-    (".xodr", "<OpenDRIVE><header/></OpenDRIVE>", "no <road>"),
-    (
-        ".osm",
-        lanelet2(lambda x, y: ">"),
-        r"line 1, <node>: node \d+ has neither tags local_x and local_y nor lat and lon",
-    ),
-    (".osm", lanelet2(lambda x, y: f'lat="{91 + x}" lon="{y}">'), "degrees up to 90 are needed"),
-    (".osm", lanelet2(lambda x, y: f'lat="{x / 10}" lon="{y / 10}">'), "km from their middle"),
-    (".osm", lanelet2(lambda x, y: 'lat="1" lon="2">'), "no length"),
+BROKEN = [  # suffix, text
+    (".osm", ""),
+    (".osm", "<osm/>"),
+    (".osm", "<OpenDRIVE/>"),
+    (".xodr", "<osm/>"),
+    (".xml", "<osm/>"),
+    (".xml", "<commonRoad/>"),
+    (".xodr", "<OpenDRIVE><header/></OpenDRIVE>"),
+    (".osm", lanelet2(lambda x, y: ">")),
+    (".osm", lanelet2(lambda x, y: f'lat="{91 + x}" lon="{y}">')),
+    (".osm", lanelet2(lambda x, y: f'lat="{x / 10}" lon="{y / 10}">')),
+    (".osm", lanelet2(lambda x, y: 'lat="1" lon="2">')),
 ]
 
 
-ODD = [  # one odd element: suffix, text, the note with its reason
-    (
-        ".osm",
-        lanelet2().replace('<tag k="local_x"', '<tag k="local_z"', 1),
-        "two frames cannot be mixed",
-    ),
-    (
-        ".osm",
-        lanelet2().replace('<nd ref="1"/>', '<nd ref="77777"/>', 1),
-        "node 77777 of way 1000 is not in the map",
-    ),
-    (
-        ".osm",
-        lanelet2().replace('role="left"', 'role="middle"', 1),
-        "has 0 members with role left",
-    ),
-    (".osm", lanelet2().replace('v="60.0"', 'v="nan"', 1), "is not a number"),
-    (
-        ".osm",
-        lanelet2().replace('<node id="2"', '<node id="1"', 1),
-        "second node 1, first on line 1",
-    ),
-    (".xodr", opendrive().replace('curvature="0.125"', 'curvature="1e9"', 1), "curvature"),
-    (".xodr", opendrive().replace("<line/>", "<helix/>", 1), "has none of line, arc, spiral"),
-    (".xodr", opendrive().replace('a="3.5"', 'a="inf"', 1), "is not a number"),
-    (
-        ".xodr",
-        opendrive().replace('incomingRoad="0"', 'incomingRoad="99"', 1),
-        "road '99' is not in the map",
-    ),
-    (".xodr", opendrive().replace('<lane id="1"', '<lane id="one"', 1), "whole numbers above 0"),
-    (
-        ".xml",
-        FORMATS[".xml"]().replace('<successor ref="102"/>', '<successor ref="9999"/>', 1),
-        "successor 9999 of lanelet 100 is not in the map",
-    ),
-    (
-        ".xml",
-        FORMATS[".xml"]().replace("<x>-60.0</x>", "<x>west</x>", 1),
-        r"line 1, <x>: 'west' is not a number",
-    ),
-    (".xml", FORMATS[".xml"]().replace("leftBound", "left", 2), "has no <leftBound>"),
-    (
-        ".xml",
-        FORMATS[".xml"]().replace("8.333333333333334", "fast"),
-        "faulty speed sign left out .*'fast' is not a speed",
-    ),
-    (
-        ".xodr",
-        opendrive().replace('id="1" junction', 'id="0" junction', 1),
-        "second road 0, first on line 1",
-    ),
+ODD = [  # one odd element: suffix, what is written, what replaces it
+    (".osm", '<tag k="local_x"', '<tag k="local_z"'),
+    (".osm", '<nd ref="1"/>', '<nd ref="77777"/>'),
+    (".osm", 'role="left"', 'role="middle"'),
+    (".osm", 'v="60.0"', 'v="nan"'),
+    (".osm", '<node id="2"', '<node id="1"'),
+    (".xodr", 'curvature="0.125"', 'curvature="1e9"'),
+    (".xodr", "<line/>", "<helix/>"),
+    (".xodr", 'a="3.5"', 'a="inf"'),
+    (".xodr", 'incomingRoad="0"', 'incomingRoad="99"'),
+    (".xodr", '<lane id="1"', '<lane id="one"'),
+    (".xodr", 'id="1" junction', 'id="0" junction'),
+    (".xml", '<successor ref="102"/>', '<successor ref="9999"/>'),
+    (".xml", "<x>-60.0</x>", "<x>west</x>"),
+    (".xml", "leftBound", "left"),
+    (".xml", "8.333333333333334", "fast"),
 ]
 
 
-@pytest.mark.parametrize(("suffix", "text", "said"), ODD, ids=range(len(ODD)))
-def test_odd_element_is_omitted_and_named(tmp_path, suffix, text, said):
+@pytest.mark.parametrize(("suffix", "old", "new"), ODD)
+def test_odd_element_is_omitted_and_named(tmp_path, suffix, old, new):
     """As the formats' own libraries do, which open the rest."""
-    (tmp_path / "odd").mkdir()
-    whole, rest = (
-        read_network(write(tmp_path, suffix, FORMATS[suffix]())),
-        read_network(write(tmp_path / "odd", suffix, text)),
-    )
-    assert [note for note in rest.notes if re.search(said, str(note))], rest.notes
+    text = FORMATS[suffix]()
+    assert old in text
+    whole = read_network(write(tmp_path, suffix, text))
+    count = 2 if old == "leftBound" else 1  # both tags of it
+    rest = read_network(write(tmp_path, suffix, text.replace(old, new, count)))
+    faults = [
+        [note for note in each.notes if note.kind in (NoteKind.FAULTY, NoteKind.LINKS_LEFT_OUT)]
+        for each in (whole, rest)
+    ]
+    assert len(faults[1]) > len(faults[0])
     assert 0.5 * len(whole.lanes) <= len(rest.lanes) <= len(whole.lanes)
-    assert not [note for note in whole.notes if note.kind is NoteKind.FAULTY]
 
 
 @pytest.mark.parametrize("unit", ["kmh", " km/h", "KMH"])
@@ -252,12 +214,11 @@ def test_requested_faulty_lanelet_is_refused(tmp_path):
         build_road(f"{path}#lanelet=2000")
 
 
-@pytest.mark.parametrize(("suffix", "text", "said"), BROKEN, ids=range(len(BROKEN)))
-def test_broken_map_has_name_and_place(tmp_path, suffix, text, said):
+@pytest.mark.parametrize(("suffix", "text"), BROKEN, ids=range(len(BROKEN)))
+def test_broken_map_is_refused_by_name(tmp_path, suffix, text):
     path = write(tmp_path, suffix, text)
-    with pytest.raises(InputError, match=said) as error:
+    with pytest.raises(InputError, match=path.stem):
         build_road(str(path))
-    assert path.stem in str(error.value)
 
 
 STACKED = (  # a ring of one lanelet over and over: each follows all
@@ -292,40 +253,27 @@ def across(count, length):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "text", "limit", "said"),
+    ("suffix", "text", "limit", "most"),
     [
-        (".osm", lanelet2(), ("drafts.MAX_LANES_COUNT", 10), "more than 10 lanes"),
-        (".xml", FORMATS[".xml"](), ("drafts.MAX_LANES_COUNT", 10), "more than 10 lanes"),
-        (".xodr", opendrive(), ("drafts.MAX_LANES_COUNT", 10), "more than 10 lanes"),
-        (
-            ".xodr",
-            opendrive(),
-            ("drafts.MAX_SECTIONS_COUNT", 300),
-            "lanes with more than 300 points",
-        ),
-        (".osm", lanelet2(), ("drafts.MAX_SECTIONS_COUNT", 50), "lanes with more than 50 points"),
-        (
-            ".osm",
-            STACKED,
-            ("drafts.MAX_LINKS_COUNT", 100),
-            "lane 0 has 149 successors; at most 100 are read",
-        ),
-        (
-            ".xml",
-            across(30, 40.0),
-            ("network._MAX_COMPARED_COUNT", 100),
-            "more than 100 pairs of lanes overlap, as at lane 0",
-        ),
-        (".xodr", opendrive().replace('d="0"', 'd="9e7"'), None, "km; check the coordinates"),
+        (".osm", lanelet2(), "drafts.MAX_LANES_COUNT", 10),
+        (".xml", FORMATS[".xml"](), "drafts.MAX_LANES_COUNT", 10),
+        (".xodr", opendrive(), "drafts.MAX_LANES_COUNT", 10),
+        (".xodr", opendrive(), "drafts.MAX_SECTIONS_COUNT", 300),
+        (".osm", lanelet2(), "drafts.MAX_SECTIONS_COUNT", 50),
+        (".osm", STACKED, "drafts.MAX_LINKS_COUNT", 100),
+        (".xml", across(30, 40.0), "network._MAX_COMPARED_COUNT", 100),
     ],
-    ids=("lanes", "lanes", "lanes", "points", "points", "links", "crossings", "lengths"),
+    ids=("lanes", "lanes", "lanes", "points", "points", "links", "crossings"),
 )
-def test_oversized_maps_are_refused(tmp_path, monkeypatch, suffix, text, limit, said):
-    if limit:
-        monkeypatch.setattr(f"scenario_gen.roads.vector.{limit[0]}", limit[1])
-    with pytest.raises(InputError, match=said) as error:
+def test_oversized_maps_are_refused(tmp_path, monkeypatch, suffix, text, limit, most):
+    monkeypatch.setattr(f"scenario_gen.roads.vector.{limit}", most)
+    with pytest.raises(InputError, match=f" {most} "):
         read_network(write(tmp_path, suffix, text))
-    assert "map" in str(error.value)
+
+
+def test_lane_of_impossible_length_is_refused(tmp_path):
+    with pytest.raises(InputError, match="km"):
+        read_network(write(tmp_path, ".xodr", opendrive().replace('d="0"', 'd="9e7"')))
 
 
 def test_crossing_lanes_are_one_junction(tmp_path):
