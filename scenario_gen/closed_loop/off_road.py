@@ -8,32 +8,29 @@ if it reports an exit, the depth is measured, at poses so close together that no
 footprint moves more than POSE_SPACING_M from one to the next.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
-from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.boxes import Box, box_distance, box_gap, corners
 from scenario_gen.numerics.hermite import control_points
-from scenario_gen.numerics.plane import edge_lengths, place
-from scenario_gen.numerics.polygons import distance_field
-from scenario_gen.roads import footprint_fits, to_cells, to_metres
+from scenario_gen.numerics.kernels import F, F2, kernel
+from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.roads import footprint_fits, to_cells
+from scenario_gen.roads.clearance import is_open
 from scenario_gen.types import Motion, Obstacle, Road
-from scenario_gen.types.road import MAX_DEPTH_M
 
 POSE_SPACING_M = 0.05
-POINTS_COUNT = (25, 11)  # along and across a footprint, of which the deepest is found
-DEPTH_ERROR_M = 0.01
-_ROUNDING_M = 1e-6  # of depths, so that it leaves out no point
+MAX_DEPTH_M = 10.0  # room and depth are measured up to this
+DEPTH_ERROR_M = 0.001
 SUBSTEPS_COUNT = 200  # per step, to locate the beginning of an event
 RESOLUTION_S = 1e-6  # an event that cannot be excluded over such an interval counts
+_HALF_DIAGONAL_CELLS = 0.7072  # rounded up
 
 
 class RoadUse(NamedTuple):
@@ -43,12 +40,10 @@ class RoadUse(NamedTuple):
         margin: least signed distance [m] to the area that is not drivable: positive inside,
             negative the greatest depth outside; NaN if no road is known, at most MAX_DEPTH_M
             either way.
-        area: greatest part of the footprint [m²] outside at one instant; 0 if it stayed inside.
         time: first time at which the depth reached the limit [s], NaN if it never did.
     """
 
     margin: float
-    area: float
     time: float
 
 
@@ -58,7 +53,7 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     The ego leaves the road when its footprint is outside by more than 0 and at least `limit` [m].
     """
     if road is None or drive.driven < 2:
-        return RoadUse(math.nan, 0.0, math.nan)
+        return RoadUse(math.nan, math.nan)
     motion = drive.motion.select([drive.ego], 0, drive.driven - 1)
     half = motion.vehicles[0].half
     control, out = np.empty((1, len(motion.time) - 1, 4, 2)), np.empty((1, 2))
@@ -67,24 +62,23 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
         motion.time, control, motion.heading, np.array([half]), Ground.of(road), RESOLUTION_S, out
     )
     if out[0, 0] == Proof.PROVEN:
-        edge = _Ground.around(road, motion.poses[0], half).pavement.boundary
-        room = shapely.distance(_footprints(motion.poses[0], half), edge).min()
-        return RoadUse(float(np.clip(room, RESOLUTION_S, MAX_DEPTH_M)), 0.0, math.nan)
-    is_out = _Ground.around(road, motion.poses[0], half).is_out(motion.poses[0], half, limit)
-    first_out = motion.time[np.argmax(is_out)] if is_out.any() else motion.time[-1]
+        return RoadUse(max(_room(road, motion.poses[0], half), RESOLUTION_S), math.nan)
+
+    def is_out(time: Floats) -> Bools:
+        return _is_out(road, motion.at(time).poses[0], half, limit)
+
+    out_at = is_out(motion.time)
+    first_out = motion.time[np.argmax(out_at)] if out_at.any() else motion.time[-1]
     time = _fine_times(motion)  # from then on the samples suffice
     time = np.union1d(time[time <= first_out], motion.time)
-    poses = motion.at(time).poses[0]
-    ground = _Ground.around(road, poses, half)
-    reached = ground.is_out(poses, half, limit)
+    reached = is_out(time)
     begin = math.nan
     if reached.any():
         k = int(np.argmax(reached))
         between = np.linspace(time[max(k - 1, 0)], time[k], SUBSTEPS_COUNT + 1)
-        begin = float(between[np.argmax(ground.is_out(motion.at(between).poses[0], half, limit))])
-    area = shapely.area(shapely.difference(_footprints(poses, half), ground.pavement)).max()
-    deepest = poses[np.argmax(ground.greatest_depths(poses, _grid(half)).max(axis=1))]
-    return RoadUse(-_depth(road, deepest, half), float(area), begin)
+        begin = float(between[np.argmax(is_out(between))])
+    depth = _depth(road, motion.at(time).poses[0], half, 0.0, MAX_DEPTH_M)
+    return RoadUse(-depth, begin)
 
 
 def first_obstacle(drive: Drive, road: Road | None) -> tuple[float, Obstacle] | None:
@@ -111,10 +105,9 @@ def _touches(road: Road, poses: Floats, half: tuple[float, float]) -> Bools:
 
 def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: float) -> bool:
     """Whether a footprint at a pose (3,) is off the road, as in `road_use`, or in an obstacle."""
-    if footprint_fits(road, pose[None], 2.0 * half[0], 2.0 * half[1])[0]:
-        return False
-    in_obstacle = bool(road.obstacles) and bool(_touches(road, pose[None], half).any())
-    return in_obstacle or _depth(road, pose, half) >= limit
+    if _is_out(road, pose[None], half, limit)[0]:
+        return True
+    return bool(road.obstacles) and bool(_touches(road, pose[None], half).any())
 
 
 def _fine_times(motion: Motion) -> Floats:
@@ -127,112 +120,177 @@ def _fine_times(motion: Motion) -> Floats:
     return np.asarray(np.interp(place_in_steps, np.arange(steps + 1), motion.time))
 
 
-def _depth(road: Road, pose: Floats, half: tuple[float, float]) -> float:
-    """Return the greatest depth [m] of a footprint at a pose (3,) outside the road, to 1 cm."""
-    ground = _Ground.around(road, pose[None], half)
-    points = _grid(half)
-    spacing = 2.0 * max(half) / (min(POINTS_COUNT) - 1)
-    while spacing > DEPTH_ERROR_M:
-        deepest = points[np.argmax(ground.greatest_depths(pose[None], points))]
-        spacing /= 4.0
-        points = np.clip(deepest + spacing * _grid((4.0, 4.0)), np.negative(half), half)
-    return float(ground.greatest_depths(pose[None], points).max())
-
-
-def _grid(half: tuple[float, float]) -> Floats:
-    """Return points (M, 2) [m] spread over a footprint in its frame."""
-    along, across = (np.linspace(-h, h, n) for h, n in zip(half, POINTS_COUNT, strict=True))
-    return np.stack(np.meshgrid(along, across), axis=-1).reshape(-1, 2)
-
-
 def _footprints(poses: Floats, half: tuple[float, float]) -> Any:
     """Return the footprints (P,) at poses (P, 3) as polygons."""
     return shapely.polygons(corners(poses, 2.0 * half[0], 2.0 * half[1]))
 
 
-@dataclass(frozen=True, eq=False)
-class _Ground:
-    """The drivable area, as far as it matters for some poses.
+def _in_cells(road: Road, poses: Floats) -> Floats:
+    """Return poses (P, 3) [m, m, rad] with positions in the road's grid [cells]."""
+    return np.concatenate((to_cells(road, poses[:, :2]), poses[:, 2:3]), axis=1)
 
-    Attributes:
-        road: the road.
-        first: (2,) column and row of the first cell.
-        cells: (H, W) whether they are drivable.
+
+def _is_out(road: Road, poses: Floats, half: tuple[float, float], limit: float) -> Bools:
+    """Return (P,) whether a footprint is outside by more than 0 and at least a limit [m]."""
+    out = ~footprint_fits(road, poses[:, :3], 2.0 * half[0], 2.0 * half[1])
+    known, enough = max(limit - DEPTH_ERROR_M, 0.0), max(limit, RESOLUTION_S)
+    out[out] = [_depth(road, pose[None], half, known, enough) >= enough for pose in poses[out]]
+    return out
+
+
+def _depth(
+    road: Road, poses: Floats, half: tuple[float, float], known: float, enough: float
+) -> float:
+    """Return how far [m] a footprint at poses (P, 3) is outside at most, or a known depth.
+
+    The search ends at a depth that is enough.
     """
+    lengths = np.array((*half, known, enough, MAX_DEPTH_M, DEPTH_ERROR_M)) / road.resolution
+    depth = (
+        greatest_depth(road.clearance_cells, _in_cells(road, poses), *lengths) * road.resolution
+    )
+    return float(min(depth, MAX_DEPTH_M))
 
-    road: Road
-    first: Ints
-    cells: Bools
 
-    @classmethod
-    def around(cls, road: Road, poses: Floats, half: tuple[float, float]) -> "_Ground":
-        """Return the area around a footprint at poses (P, 3)."""
-        reach = MAX_DEPTH_M + math.hypot(*half)
-        low, high = (
-            np.clip(np.floor(to_cells(road, end)), 0, road.drivable.shape[::-1]).astype(np.int64)
-            for end in (poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
-        )
-        return cls(road, low, road.drivable[low[1] : high[1] + 1, low[0] : high[0] + 1])
+def _room(road: Road, poses: Floats, half: tuple[float, float]) -> float:
+    """Return the least distance [m] from a footprint at poses (P, 3) to closed cells."""
+    size = road.resolution
+    scaled = (half[0] / size, half[1] / size, MAX_DEPTH_M / size)
+    return float(least_room(road.clearance_cells, _in_cells(road, poses), *scaled) * size)
 
-    @cached_property
-    def pavement(self) -> BaseGeometry:
-        """The drivable cells as one polygon."""
-        change = np.diff(np.pad(self.cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-        rows, first = np.nonzero(change > 0)
-        _, last = np.nonzero(change < 0)
-        runs = shapely.union_all(shapely.box(first, rows, last, rows + 1))
-        area = shapely.transform(runs, lambda cells: to_metres(self.road, cells + self.first))
-        shapely.prepare(area)
-        return area
 
-    @cached_property
-    def _depth_cells(self) -> Floats:
-        """Distances [cells] from centres of closed cells to drivable squares, with a wide rim."""
-        return distance_field(np.pad(~self.cells, self._rim, constant_values=True))
+@kernel(inline=True)
+def _nearest_open(
+    clearance: Floats, x: float, y: float, farthest: float
+) -> tuple[float, int, int]:
+    """Return the distance [cells] to the nearest drivable square, and its column and row.
 
-    @property
-    def _rim(self) -> int:
-        return 2 * math.ceil(MAX_DEPTH_M / self.road.resolution) + 2
+    Rings of squares around the point, until the next ring is farther away.
+    """
+    column, row = int(np.floor(x)), int(np.floor(y))
+    best, best_column, best_row, ring = farthest, column, row, 0
+    while ring - 1.0 < best:
+        for i in range(row - ring, row + ring + 1):
+            stride = 1 if abs(i - row) == ring else 2 * ring
+            for j in range(column - ring, column + ring + 1, stride):
+                gap = _to_square(x, y, j, i)
+                if gap < best and is_open(clearance, i, j):
+                    best, best_column, best_row = gap, j, i
+        ring += 1
+    return best, best_column, best_row
 
-    def is_out(self, poses: Floats, half: tuple[float, float], limit: float) -> Bools:
-        """Return (P,) whether a point of a footprint is outside by more than 0 and a limit [m]."""
-        fits = footprint_fits(self.road, poses, 2.0 * half[0], 2.0 * half[1])
-        out = np.asarray(~fits)
-        places, least, most = self._bounds(poses[out], _grid(half))
-        is_sure = np.asarray((least >= limit + _ROUNDING_M).any(axis=1))
-        unsure = (most >= limit - _ROUNDING_M) & ~is_sure[:, None]
-        depths = np.zeros(least.shape)
-        depths[unsure] = self._depths(places[unsure])
-        out[out] = is_sure | ((depths >= limit) & (depths > 0.0)).any(axis=1)
-        return out
 
-    def greatest_depths(self, poses: Floats, points: Floats) -> Floats:
-        """Return (P, M) how far [m] points (M, 2) of a footprint at poses (P, 3) are outside.
+@kernel(inline=True)
+def _all_open(clearance: Floats, part: Box) -> bool:
+    """Return whether all squares around a rectangle are drivable."""
+    across = part.length * abs(part.cos) + part.width * abs(part.sin)
+    along = part.length * abs(part.sin) + part.width * abs(part.cos)
+    for i in range(int(np.floor(part.y - along)), int(np.floor(part.y + along)) + 1):
+        for j in range(int(np.floor(part.x - across)), int(np.floor(part.x + across)) + 1):
+            if not is_open(clearance, i, j):
+                return False
+    return True
 
-        It is 0 for points that are surely not the farthest ones.
-        """
-        places, least, most = self._bounds(poses, points)
-        deep = most >= least.max() - _ROUNDING_M
-        depths = np.zeros(deep.shape)
-        depths[deep] = self._depths(places[deep])
-        return depths
 
-    def _depths(self, places: Floats) -> Floats:
-        """Return (K,) how far [m] places (K, 2) [m] are outside."""
-        distance = shapely.distance(shapely.points(places), self.pavement)
-        return np.asarray(np.nan_to_num(distance, nan=MAX_DEPTH_M).clip(max=MAX_DEPTH_M))
+@kernel(inline=True)
+def _to_square(x: float, y: float, column: int, row: int) -> float:
+    """Return the distance [cells] from a point to a square."""
+    across = max(column - x, x - column - 1.0, 0.0)
+    return float(np.hypot(across, max(row - y, y - row - 1.0, 0.0)))
 
-    def _bounds(self, poses: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return places (P, M, 2) of points of a footprint, and their least and greatest depths.
 
-        A point is as deep as the centre of its cell, but for the distance between them.
-        """
-        places = place(poses[:, None], *points.T)
-        cell = to_cells(self.road, places) - self.first + self._rim
-        inside = np.clip(np.floor(cell), 0, np.array(self._depth_cells.shape[::-1]) - 1)
-        between = np.hypot(*np.moveaxis(cell - inside - 0.5, -1, 0))
-        column, row = np.moveaxis(inside.astype(np.int64), -1, 0)
-        about, size = self._depth_cells[row, column], self.road.resolution
-        between[about == 0.0] = 0.0  # they are in drivable cells
-        least = np.minimum((about - between) * size, MAX_DEPTH_M)
-        return places, least, np.minimum((about + between) * size, MAX_DEPTH_M)
+@kernel(inline=True)
+def _farthest_corner(part: Box, column: int, row: int) -> tuple[float, float, float]:
+    """Return the distance [cells] of a rectangle's farthest corner from a square, and its x, y."""
+    farthest, far_x, far_y = -1.0, part.x, part.y
+    for ahead in (-part.length, part.length):
+        for left in (-part.width, part.width):
+            x = part.x + ahead * part.cos - left * part.sin
+            y = part.y + ahead * part.sin + left * part.cos
+            distance = _to_square(x, y, column, row)
+            if distance > farthest:
+                farthest, far_x, far_y = distance, x, y
+    return farthest, far_x, far_y
+
+
+@kernel(inline=True)
+def _halves(part: Box) -> tuple[Box, Box]:
+    """Return the halves of a rectangle, divided across its longer side."""
+    x, y, cos, sin, length, width = part
+    if length > width:
+        dx, dy = 0.5 * length * cos, 0.5 * length * sin
+        length *= 0.5
+    else:
+        dx, dy = -0.5 * width * sin, 0.5 * width * cos
+        width *= 0.5
+    return (
+        Box(x - dx, y - dy, cos, sin, length, width),
+        Box(x + dx, y + dy, cos, sin, length, width),
+    )
+
+
+@kernel(F2, F2, F, F, F, F, F, F)
+def greatest_depth(
+    clearance: Floats,
+    poses: Floats,
+    half_length: float,
+    half_width: float,
+    known: float,
+    enough: float,
+    farthest: float,
+    error: float,
+) -> float:
+    """Return how far points of a rectangle are at most from drivable squares (H, W) [cells].
+
+    Branch and bound: no point of a part of the rectangle is farther than its farthest corner from
+    the square that is nearest to its centre.
+
+    Args:
+        clearance: (H, W) of the squares.
+        poses: (P, 3) of the rectangle: x, y, like all lengths in cells, and yaw [rad].
+        half_length: along the yaw.
+        half_width: across it.
+        known: a depth that is returned if no point is deeper.
+        enough: a depth at which the search ends.
+        farthest: a depth that is not exceeded.
+        error: of the depth.
+    """
+    best = known
+    for p in range(len(poses)):
+        x, y, yaw = poses[p]
+        parts = [Box(x, y, np.cos(yaw), np.sin(yaw), half_length, half_width)]
+        while len(parts) > 0 and best < enough:
+            part = parts.pop()
+            if _all_open(clearance, part):
+                continue
+            _, column, row = _nearest_open(clearance, part.x, part.y, farthest)
+            bound, x, y = _farthest_corner(part, column, row)
+            best = max(best, _nearest_open(clearance, x, y, farthest)[0])
+            if min(bound, farthest) > best + error:
+                parts.extend(_halves(part))
+    return best
+
+
+@kernel(F2, F2, F, F, F)
+def least_room(
+    clearance: Floats, poses: Floats, half_length: float, half_width: float, farthest: float
+) -> float:
+    """Return the least distance from a rectangle at poses (P, 3) to closed squares [cells].
+
+    The clearance field (H, W) tells which poses and squares cannot be nearer than the best.
+    """
+    radius = np.hypot(half_length, half_width) + _HALF_DIAGONAL_CELLS
+    best = farthest
+    for p in range(len(poses)):
+        x, y = poses[p, 0], poses[p, 1]
+        if clearance[int(y), int(x)] - _HALF_DIAGONAL_CELLS - radius >= best:
+            continue
+        box = Box(x, y, np.cos(poses[p, 2]), np.sin(poses[p, 2]), half_length, half_width)
+        reach = best + radius
+        for i in range(int(np.floor(y - reach)), int(y + reach) + 1):
+            for j in range(int(np.floor(x - reach)), int(x + reach) + 1):
+                if not is_open(clearance, i, j):
+                    square = Box(j + 0.5, i + 0.5, 1.0, 0.0, 0.5, 0.5)
+                    if box_gap(box, square) < best:  # at most the distance
+                        best = min(best, box_distance(box, square))
+    return best

@@ -10,6 +10,7 @@ the road from `setback` beyond its edge.
 
 from dataclasses import replace
 from functools import lru_cache
+import math
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from scenario_gen.closed_loop.config import ObservationConfig
 from scenario_gen.closed_loop.driver_traits import driver_draws
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
+from scenario_gen.numerics.polygons import distance_field
 from scenario_gen.roads import segments_free
 from scenario_gen.types import Road, Scenario
 
@@ -96,9 +98,9 @@ def _crosses(eye: Floats, points: Floats, vehicles: Floats, half: Floats) -> Boo
 @lru_cache(maxsize=4)
 def _sight_ground(road: Road, setback: float) -> Road:
     """Return a road whose drivable cells do not block the sight."""
-    rim = (road.closed_cells.shape[0] - road.drivable.shape[0]) // 2
-    depth = road.depth_cells[rim:-rim, rim:-rim] * road.resolution
-    clear = depth <= setback
+    rim = math.ceil(setback / road.resolution) + 1  # beyond it `distance_field` knows no cells
+    depth = distance_field(np.pad(~road.drivable, rim, constant_values=True))
+    clear = depth[rim:-rim, rim:-rim] * road.resolution <= setback
     if road.obstructed is not None:
         clear &= ~road.obstructed
     return replace(road, drivable=clear, obstructed=None, lanes=None)

@@ -24,7 +24,9 @@ from scenario_gen.closed_loop.fault import (
 from scenario_gen.closed_loop.imposed import imposed_braking
 from scenario_gen.closed_loop.lights import ran_red
 from scenario_gen.closed_loop.off_road import (
+    DEPTH_ERROR_M,
     first_obstacle,
+    MAX_DEPTH_M,
     road_use,
 )
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
@@ -33,7 +35,6 @@ from scenario_gen.method.evaluation import distance_and_ttc
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, encroachment
-from scenario_gen.types.road import MAX_DEPTH_M
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
@@ -106,7 +107,6 @@ class DriveVerdict:
             positive inside, negative the greatest depth outside; at most 10 m either way; NaN if
             no road is known.
         off_road_depth: depth [m] from which a footprint is off the road.
-        off_road_area: greatest part of the footprint outside [m²].
         jumps: number of poses that no vehicle can reach in a step.
         stood: duration for which the ego stood at the end of the drive.
         terms: terms of nuPlan's and NAVSIM's scores.
@@ -139,7 +139,6 @@ class DriveVerdict:
     road_known: bool
     road_margin: float
     off_road_depth: float
-    off_road_area: float
     jumps: int
     stood: float
     terms: Terms
@@ -245,11 +244,10 @@ class DriveVerdict:
             }[hit.ran]
             messages.append(f"{words} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})")
         if not math.isnan(self.off_road):
-            is_far = self.road_margin <= -MAX_DEPTH_M
+            is_far = self.road_margin <= DEPTH_ERROR_M - MAX_DEPTH_M
             depth = f"more than {MAX_DEPTH_M:g} m" if is_far else f"{-self.road_margin:.2f} m"
-            depth = f"by {depth}, {self.off_road_area:.1f} m² of its footprint"
             event = f"ran into obstacle `{self.obstacle}`" if self.obstacle else "left the road"
-            messages.append(f"{event} at {self.off_road:.2f} s ({depth})")
+            messages.append(f"{event} at {self.off_road:.2f} s (by {depth})")
         if not math.isnan(self.ran_red):
             messages.append(f"ran a red light at {self.ran_red:.2f} s")
         if self.took_turn:
@@ -359,7 +357,6 @@ def judge(
         road_known=loop.road is not None,
         road_margin=road.margin,
         off_road_depth=config.off_road_depth,
-        off_road_area=road.area,
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[drive.ego], config.step),
         terms=terms(drive, hit, not math.isnan(off_road), progress, clearance.ttc_not_behind),

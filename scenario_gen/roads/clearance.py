@@ -164,13 +164,12 @@ def _gap_squared(ax: float, ay: float, bx: float, by: float, left: float, low: f
 
 
 @kernel(inline=True)
-def _is_open(clearance: Floats, i: int, j: int) -> bool:
+def is_open(clearance: Floats, i: int, j: int) -> bool:
     """Return whether a cell is inside the grid and drivable."""
     height, width = clearance.shape
     if not (0 <= i < height and 0 <= j < width):
         return False
-    is_open: bool = clearance[i, j] != 0.0
-    return is_open
+    return bool(clearance[i, j] != 0.0)
 
 
 @kernel(inline=True)
@@ -181,8 +180,10 @@ def _near_squares_free(
     reach = radius + CONTACT_CELLS
     for i in range(int(np.floor(min(ay, by) - reach)), int(np.floor(max(ay, by) + reach)) + 1):
         for j in range(int(np.floor(min(ax, bx) - reach)), int(np.floor(max(ax, bx) + reach)) + 1):
-            is_open = _is_open(clearance, i, j)
-            if not is_open and _gap_squared(ax, ay, bx, by, j, i) <= reach * reach:
+            if (
+                not is_open(clearance, i, j)
+                and _gap_squared(ax, ay, bx, by, j, i) <= reach * reach
+            ):
                 return False
     return True
 
@@ -266,7 +267,7 @@ def _footprint_free(
 ) -> bool:
     """Return whether the rectangle at one pose covers drivable cells only."""
     i, j = int(np.floor(y)), int(np.floor(x))
-    if not _is_open(clearance, i, j):
+    if not is_open(clearance, i, j):
         return False
     reach = np.sqrt(half_length * half_length + half_width * half_width)
     if clearance[i, j] - _HALF_DIAGONAL_CELLS >= reach:
@@ -282,7 +283,7 @@ def _footprint_free(
     for i in range(first, last):
         low, high = _extent_in_row(corner_x, corner_y, i)
         for j in range(int(np.floor(low + CONTACT_CELLS)), int(np.ceil(high - CONTACT_CELLS))):
-            if not _is_open(clearance, i, j):
+            if not is_open(clearance, i, j):
                 return False
     return True
 

@@ -6,7 +6,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +38,6 @@ DIRECTION_COUNT = 16
 """The directions that `Road.lane_directions` tells apart."""
 _AGAINST_RAD = np.pi / 2.0 + np.pi / DIRECTION_COUNT  # half a direction's width stays open
 _CHUNK_CELLS = 4096
-MAX_DEPTH_M = 10.0  # a depth off the road is measured up to this
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,19 +140,6 @@ class Road:
     def clearance_at(self, rows: Ints | slice, columns: Ints | slice) -> Floats:
         """Return the `clearance_cells` of some cells [m]; a second grid would be large."""
         return np.asarray(self.clearance_cells[rows, columns] * self.resolution)
-
-    @cached_property
-    def closed_cells(self) -> Bools:
-        """(H + 2 R, W + 2 R) closed cells, with a closed rim wider than 2 MAX_DEPTH_M."""
-        rim = 2 * math.ceil(MAX_DEPTH_M / self.resolution) + 2
-        return sealed(np.pad(~self.drivable, rim, constant_values=True))
-
-    @cached_property
-    def depth_cells(self) -> Floats:
-        """(H + 2 R, W + 2 R) [cells] from centres of `closed_cells` to the nearest open square."""
-        from scenario_gen.numerics.polygons import distance_field  # loads numba
-
-        return distance_field(self.closed_cells)
 
     @cached_property
     def walkable(self) -> "Road":
