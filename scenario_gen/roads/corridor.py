@@ -16,7 +16,7 @@ from scenario_gen.roads.drawn import crossing_lane, draw_lanes, middle_stations
 from scenario_gen.roads.lights import recorded_rules
 from scenario_gen.roads.pavement import drivable_width, paved, swept
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, Lane, LaneNetwork, Road, Trailer, trailer_poses
+from scenario_gen.types import Encounter, Lane, LaneNetwork, Road, trailer_poses
 
 _FOOTPRINT_STEP_M = 0.25
 
@@ -39,26 +39,23 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
         raise InputError(f"road {name} is drawn around a recording; give a log, too")
     surface: list[BaseGeometry] = []
     paths: dict[str, Curve] = {}
-    widths: dict[str, float] = {}
-    trailers: dict[str, Trailer] = {}
-    for track in Situation.of(encounter).separation.tracks:
+    tracks = {track.vehicle.id: track for track in Situation.of(encounter).separation.tracks}
+    for name_of_vehicle, track in tracks.items():
         vehicle = track.vehicle
         reach = config.corridor_margin if track.still else config.corridor_run_out
         path = track.curve.cut(-reach, track.travelled + reach, _FOOTPRINT_STEP_M)
         width = vehicle.width + 2.0 * config.corridor_margin
-        widths[vehicle.id] = width
         surface.append(swept(path, vehicle.length, width, vehicle.trailer))
         if not track.still:
-            paths[vehicle.id] = path
-        if vehicle.trailer is not None:
-            trailers[vehicle.id] = vehicle.trailer
+            paths[name_of_vehicle] = path
     lanes: list[Lane] = []
     for lane_name, sharing in sharing_lanes(paths).items():
-        path = paths[lane_name]
+        path, vehicles = paths[lane_name], [tracks[each].vehicle for each in sharing]
         line = path.cut(0.0, path.length, 1.0)
-        half = np.full(len(line.points), max(widths[vehicle] for vehicle in sharing) / 2.0)
-        for towing in trailers.keys() & set(sharing):
-            towed = trailer_poses(line.points, trailers[towing])
+        width = max(vehicle.width for vehicle in vehicles) + 2.0 * config.corridor_margin
+        half = np.full(len(line.points), width / 2.0)
+        for trailer in filter(None, (vehicle.trailer for vehicle in vehicles)):
+            towed = trailer_poses(line.points, trailer)
             station, offset = line.project(towed[:, :2])
             half += np.interp(line.station, station, np.abs(offset))
         lanes.append(lane_along(f"along vehicle {lane_name}", line, half))

@@ -10,7 +10,7 @@ the clothoid that routes are made of. Where it bends, its lane is wider, as far 
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import pairwise, permutations
+from itertools import permutations
 
 import numpy as np
 import shapely
@@ -193,13 +193,10 @@ class _RoadDrawing:
             for inward in (True, False):
                 count = self._lane_count(k, inward=inward)
                 inner = count * self._width
-                borders = self._offset_lines(
-                    k, (inner, inner + self._config.cycle_lane), inward=inward
-                )
-                left, right = borders if self._sign > 0.0 else borders[::-1]
                 index[k, inward] = len(lanes)
-                name = lane_id(k, count, inward=inward)
-                lanes.append(Lane(name, left, right, users=_CYCLIST, arm=k + 1, inward=inward))
+                offsets = inner, inner + self._config.cycle_lane
+                lane = self._arm_lane(k, count, offsets, inward=inward)
+                lanes.append(replace(lane, users=_CYCLIST))
         if not self._plan.has_junction:
             return lanes
         first = len(self.lanes)
@@ -237,17 +234,23 @@ class _RoadDrawing:
         return self._plan.arms[arm].inward if inward else self._plan.arms[arm].outward
 
     def _add_arm_lanes(self, k: int, *, inward: bool) -> None:
-        count = self._lane_count(k, inward=inward)
-        first = len(self.lanes)
-        offsets = [self._width * n for n in range(count + 1)]
-        for n, borders in enumerate(pairwise(self._offset_lines(k, offsets, inward=inward))):
-            left, right = borders if self._sign > 0.0 else borders[::-1]
+        count, first = self._lane_count(k, inward=inward), len(self.lanes)
+        for n in range(count):
             neighbours = tuple(first + m for m in (n - 1, n + 1) if 0 <= m < count)
             self._lane_index[k, inward, n] = first + n
-            name = lane_id(k, n, inward=inward)
-            self.lanes.append(
-                Lane(name, left, right, neighbours=neighbours, arm=k + 1, inward=inward)
-            )
+            inner, outer = self._width * n, self._width * (n + 1)
+            lane = self._arm_lane(k, n, (inner, outer), inward=inward)
+            self.lanes.append(replace(lane, neighbours=neighbours))
+
+    def _arm_lane(self, k: int, n: int, offsets: tuple[float, float], *, inward: bool) -> Lane:
+        """Return lane n of an arm between offsets [m] from its dividing line."""
+        line = self._lines[k].cut(0.0, self._mouths[k], _ARM_STEP_M)
+        side = -self._sign if inward else self._sign
+        borders = [line.at_offset(line.station, side * offset)[:, :2] for offset in offsets]
+        left, right = (border if inward else border[::-1] for border in borders)
+        if self._sign < 0.0:
+            left, right = right, left
+        return Lane(lane_id(k, n, inward=inward), left, right, arm=k + 1, inward=inward)
 
     def _add_routes(self) -> None:
         """Add the lanes through the junction, and the ground that they need."""
@@ -313,16 +316,6 @@ class _RoadDrawing:
             if connection.to_arm == k:
                 mouth = min(mouth, _straight_length(route.reversed()))
         return max(mouth - _BEFORE_MOUTH_M, _MIN_ARM_LANES_M)
-
-    def _offset_lines(self, k: int, offsets: Iterable[float], *, inward: bool) -> list[Floats]:
-        """Return lines (M, 2) at offsets [m] from an arm's dividing line, along its traffic.
-
-        They lie on the side of its lanes in or out.
-        """
-        line = self._lines[k].cut(0.0, self._mouths[k], _ARM_STEP_M)
-        side = -self._sign if inward else self._sign
-        lines = [line.at_offset(line.station, side * offset)[:, :2] for offset in offsets]
-        return lines if inward else [points[::-1] for points in lines]
 
     def _straight_connections(self) -> Iterator[Connection]:
         """Yield the connection of each lane with the same lane of each other arm.

@@ -16,13 +16,12 @@ from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,
     Placement,
-    share_at_home,
     STANDING_SPEED_MPS,
 )
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.state_check import refuse_impossible, refuse_misfits
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
-from scenario_gen.roads import ground_for, nearest_pose_with_room
+from scenario_gen.roads import ground_for, nearest_pose_with_room, share_with_room
 from scenario_gen.situation import (
     find_losses,
     manoeuvre_of,
@@ -293,7 +292,7 @@ def _place(situation: Situation, road: Road, config: FittingConfig) -> Placement
     if config.placement == "lanes" or road.map_lanes is not None:
         return place_on_lanes(tracks, road, config)
 
-    share = share_at_home(tracks, road)
+    share = float(np.mean([share_with_room(road, track) for track in tracks]))
     home_refusal = ""
     try:
         at_home = place_in_own_frame(situation, road, config)

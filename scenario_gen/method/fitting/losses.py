@@ -38,21 +38,16 @@ def allowed_losses(allow: str) -> frozenset[str]:
     return frozenset(known[name] for name in names)
 
 
-def refused_losses(losses: Iterable[Loss], allow: str) -> list[Loss]:
-    """Return the losses for which a fit is refused."""
-    allowed = allowed_losses(allow)
-    return [loss for loss in losses if loss.kind in LOSABLE and loss.kind not in allowed]
-
-
 def refuse_lost(losses: Iterable[Loss], allow: str, road: str) -> None:
     """Refuse a fit with losses that `allow` does not name.
 
     Raises:
         LostEncounterError: it has some; the message names the vehicles and the parameter.
     """
-    refused = refused_losses(losses, allow)
+    allowed = allowed_losses(allow)
+    refused = [loss for loss in losses if loss.kind in LOSABLE and loss.kind not in allowed]
     if refused:
-        kinds = sorted(allowed_losses(allow) | {loss.kind for loss in refused})
+        kinds = sorted(allowed | {loss.kind for loss in refused})
         names = ",".join(f"lost_{kind}" for kind in kinds)
         reasons = "; ".join(loss.message for loss in refused)
         raise LostEncounterError(

@@ -3,7 +3,7 @@
 
 """Placements of a recording on a road: by similarity, scale, motion and room."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -55,18 +55,6 @@ class Placement:
         return replace(placed, moved=separation.moved)
 
 
-def check_scale(scale: float, subject: str, config: FittingConfig) -> None:
-    """Raise RefusedError if a scale is too far from one.
-
-    Source: s of eq 9.
-    """
-    if not config.accepts(scale):
-        raise RefusedError(
-            f"{subject} would need scale {scale:.2f}; accepted is {config.scale_low:g} to "
-            f"{config.scale_high:g} (scale shrinks gaps but not cars)"
-        )
-
-
 _MIN_CHORD_M = 2.0  # a shorter one has no direction (eq 8) and no scale (eq 9)
 _MAX_WAITING_MOVE_M = 0.5  # between start and goal of a vehicle that waits throughout
 _MAX_TURN_ERROR_RAD = np.radians(50.0)  # of a drawn route
@@ -83,11 +71,6 @@ def place_in_own_frame(situation: Situation, road: Road, config: FittingConfig) 
     max_repair(off_road, road, config.max_move)
     notes = [Note.of(NoteKind.AT_HOME, road=road.name)]
     return replace(Placement.separated(separation, 1.0, notes), at_home=True)
-
-
-def share_at_home(tracks: Sequence[Track], road: Road) -> float:
-    """Return the share of sampled footprints with room on a road where they were recorded."""
-    return float(np.mean([share_with_room(road, track) for track in tracks]))
 
 
 def place_given(
@@ -243,7 +226,11 @@ def _placed_by_similarity(
         f"vehicle {track.vehicle.id} (recorded chord {np.hypot(*chord):.1f} m, requested "
         f"{np.hypot(*(goal - start)):.1f} m)"
     )
-    check_scale(scale, subject, config)
+    if not config.accepts(scale):
+        raise RefusedError(
+            f"{subject} would need scale {scale:.2f}; accepted is {config.scale_low:g} to "
+            f"{config.scale_high:g} (scale shrinks gaps but not cars)"
+        )
     points = track.curve.points[:, :2]
     points = place(np.array([*start, rotation]), *(scale * (points - points[0])).T)
     share = track.curve.station / track.curve.length

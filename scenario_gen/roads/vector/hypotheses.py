@@ -66,10 +66,8 @@ class Hypothesis:
 
 def recorded_poses(tracks: Sequence[Track]) -> Floats:
     """Return poses (N, POSE_COUNT, 3) at equal steps along all recorded paths."""
-    ends = [(0.0, track.travelled) for track in tracks]
-    curves = [track.curve for track in tracks]
     return np.stack(
-        [c.at(np.linspace(*end, POSE_COUNT)) for c, end in zip(curves, ends, strict=True)]
+        [track.curve.at(np.linspace(0.0, track.travelled, POSE_COUNT)) for track in tracks]
     )
 
 
