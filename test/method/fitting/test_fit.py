@@ -79,6 +79,11 @@ def straight(x, y, yaw):
     return Curve(np.array([[x, y, yaw], [x + 200.0 * np.cos(yaw), y + 200.0 * np.sin(yaw), yaw]]))
 
 
+def grid(drivable, origin=(0.0, 0.0), name="grid"):
+    """A road without lanes, in cells of 0.2 m."""
+    return Road(name, drivable, 0.2, np.array(origin), np.zeros((0, 3)), np.zeros((0, 3)))
+
+
 def relative(pose, other):
     d = other[:2] - pose[:2]
     return np.array(
@@ -285,12 +290,6 @@ def test_scale_out_of_range_is_refused():
     assert fit.requested.start[0, 3] == pytest.approx(12.0 * fit.fitted[0].scale)
 
 
-def open_ground(cells):
-    return Road(
-        "open", np.ones((cells, cells), bool), 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
-    )
-
-
 def requested(encounter, starts, goals):
     """Ask for start and goal states of all vehicles."""
     texts = [
@@ -305,7 +304,7 @@ def requested(encounter, starts, goals):
 
 def test_requested_ends_are_met_exactly():
     encounter = crossing_pair()
-    road = open_ground(1000)
+    road = grid(np.ones((1000, 1000), dtype=bool))
     chord = np.hypot(*(encounter.position[:, -1] - encounter.position[:, 0]).T)
     starts = np.array([[30.0, 100.0, 0.3, 9.0], [100.0, 60.0, 1.8, 6.0]])
     goals = starts.copy()
@@ -328,7 +327,7 @@ def test_requested_ends_are_met_exactly():
         fit_template(
             encounter,
             every(encounter),
-            open_ground(2000),
+            grid(np.ones((2000, 2000), dtype=bool)),
             request=requested(encounter, starts, far),
         )
 
@@ -347,7 +346,9 @@ def test_waiting_vehicle_cannot_be_sent_away():
     starts = np.array([[20.0, 60.0, 0.0], [60.0, 40.0, 1.5]])
     away = requested(encounter, starts, starts + np.array([59.0, 0.0, 0.0]))
     with pytest.raises(RefusedError, match="waits throughout"):
-        fit_template(encounter, every(encounter), open_ground(700), request=away)
+        fit_template(
+            encounter, every(encounter), grid(np.ones((700, 700), dtype=bool)), request=away
+        )
 
 
 def test_anchors_move_near_not_far():
@@ -360,13 +361,13 @@ def test_anchors_move_near_not_far():
     drivable[96:150, :] = (
         True  # the lower road begins at y = 19.2: vehicle 0 needs 19.05 or more, 0.15 m up
     )
-    road = Road("two roads", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    road = grid(drivable)
     fit = fit_template(encounter, every(encounter), road, FittingConfig(placement="identity"))
     assert fit.fitted[0].moved == pytest.approx(np.full(len(fit.anchor_index), 0.15), abs=0.02)
     assert not fit.fitted[1].moved.any()
     assert "vehicle 0: start moved by 0.15 m to where it has room" in map(str, fit.notes)
     drivable[96:120] = False
-    far = Road("far", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    far = grid(drivable)
     with pytest.raises(
         RefusedError,
         match=r"vehicle 0 is 5\.\d m from any pose with room at sample 0 .*fitting.max_move accepts 3 m; increase fitting.max_move",
@@ -380,14 +381,7 @@ def test_search_finds_road_of_same_shape():
         driven(straight(60.0, 3.5, np.pi), np.full(100, 2.0)),
     )
     home = build_road("corridor", encounter)
-    turned = Road(
-        "turned",
-        np.rot90(home.drivable),
-        0.2,
-        np.array([300.0, -80.0]),
-        np.zeros((0, 3)),
-        np.zeros((0, 3)),
-    )
+    turned = grid(np.rot90(home.drivable), (300.0, -80.0))
     fit = fit_template(encounter, every(encounter), turned)
     one, two = (f.anchors for f in fit.fitted)
     assert all(f.scale == 1.0 for f in fit.fitted)
@@ -395,9 +389,7 @@ def test_search_finds_road_of_same_shape():
     assert one[0, 2] == pytest.approx(
         -np.pi / 2.0, abs=0.1
     )  # rows grow with y: rot90 turns clockwise
-    narrow = Road(
-        "narrow", home.drivable[:, :60], 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
-    )
+    narrow = grid(home.drivable[:, :60], name="narrow")
     with pytest.raises(RefusedError, match="no placement on road narrow has room"):
         fit_template(encounter, every(encounter), narrow)
 
