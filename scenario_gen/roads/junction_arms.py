@@ -72,11 +72,13 @@ class ArmDirection:
         yaw: the recorded direction [rad].
         ends: of the paths on it.
         turned: [rad] by which it is drawn in another direction.
+        least_reach: [m] from the centre, without ends.
     """
 
     yaw: float
     ends: list[PathEnd]
     turned: float = 0.0
+    least_reach: float = 0.0
 
     @property
     def drawn(self) -> float:
@@ -86,7 +88,7 @@ class ArmDirection:
     def reach(self, tracks: tuple[Track, ...]) -> float:
         """Return how far [m] from the centre the footprints on it reach."""
         distances = [end.distance + tracks[end.vehicle].vehicle.rear for end in self.ends]
-        return max(distances, default=0.0)
+        return max(distances, default=self.least_reach)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ road, so there is room for it.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
@@ -33,7 +34,7 @@ from scenario_gen.roads.pavement import END_ROOM_M, JUNCTION_SLACK_M, MIN_ARM_M
 from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn
-from scenario_gen.situation import driver_rows, sharpness_of, Situation, Track
+from scenario_gen.situation import driver_rows, sharpness_of, Situation, to_frenet, Track
 from scenario_gen.types import Encounter, Note, NoteKind, Road, YIELD
 
 _MAX_LANES_COUNT = 8
@@ -210,7 +211,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     """Draw a roundabout with one lane, sized for the recorded speeds, with arms where needed.
 
     A recorded ring is drawn as it was, if cars can drive around it as fast. If the vehicles drive
-    too fast for a ring, or would not leave it, each arm is long enough for the recording.
+    too fast for a ring, or would not leave it, one arm is long enough for the recording.
 
     Raises:
         RefusedError: the recorded vehicles use more than four arms.
@@ -227,26 +228,25 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     notes = () if recorded else (Note.of(NoteKind.NO_RING, radius=ring.radius),)
     directions = find_arms(name, tracks, ring.centre, ring.radius + _RING.near_ring_m)
     if recorded is None and not _suits_ring(tracks, directions, ring):
-        length = float(
-            np.hypot(*np.ptp(np.concatenate([track.poses for track in tracks]), axis=0)[:2])
-        )
-        longer = replace(
-            config, arm_length=config.arm_length or ring.radius + length + 2.0 * END_ROOM_M
-        )
-        plan = _ring_plan(name, longer, ring, _regular_arms(), tracks)
-        return draw_plan(replace(plan, notes=notes), name, config)
+        directions = _regular_arms()
+        with suppress(RefusedError):  # the recording needs a junction
+            low, high = to_frenet(tracks).span(tracks)
+            directions = _regular_arms(ring.radius + high - low)
     plan = _ring_plan(name, config, ring, directions, tracks)
     lane_of = {end.key: (a, 0) for a, arm in enumerate(directions) for end in arm.ends}
     used = {arm for (_, inward), (arm, _) in lane_of.items() if inward}
     yielding = set(range(len(plan.arms))) - used | _yielding_arms(situation, lane_of, config)
-    frame = _westwards(ring.centre, directions[0])
-    drawn_for = aligned(tracks, lane_of, frame)
+    drawn_for = None
+    if recorded or lane_of:
+        drawn_for = aligned(tracks, lane_of, _westwards(ring.centre, directions[0]))
     plan = replace(plan, yielding=yielding, notes=notes, drawn_for=drawn_for)
     return draw_plan(plan, name, config)
 
 
-def _regular_arms() -> list[ArmDirection]:
-    return [ArmDirection(k * np.pi / 2.0, []) for k in range(4)]
+def _regular_arms(least_reach: float = 0.0) -> list[ArmDirection]:
+    """Return four arms at right angles, of which the first is as long as wanted [m]."""
+    first = ArmDirection(0.0, [], least_reach=least_reach)
+    return [first, *(ArmDirection(k * np.pi / 2.0, []) for k in (1, 2, 3))]
 
 
 def _suits_ring(tracks: tuple[Track, ...], directions: list[ArmDirection], ring: _Ring) -> bool:
