@@ -359,19 +359,25 @@ def drive_step(
 
 @kernel(inline=True)
 def _contact_clock(world: World, i: int, k: int, clock: float, box: Floats) -> float:
-    """Return the clock [s] in cell k, `clock` or later, at which vehicle i meets a box (7,)."""
+    """Return the clock [s] in cell k, `clock` or later, at which vehicle i meets a box (7,).
+
+    Infinity if it does not meet the box at the end of the cell: it passes by.
+    """
     pose = np.empty(5)
     footprint = np.empty(7)
     low = max(k * world.cell, clock)
-    high = (k + 1) * world.cell
-    for _ in range(GAP_BISECTION_STEPS):
-        middle = 0.5 * (low + high)
-        pose_at(world.time, world.motion[i], middle, pose)
+    high = np.inf
+    tried = (k + 1) * world.cell
+    for _ in range(1 + GAP_BISECTION_STEPS):
+        pose_at(world.time, world.motion[i], tried, pose)
         fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], footprint)
         if boxes_meet(footprint, box):
-            high = middle
+            high = tried
+        elif high == np.inf:
+            return high
         else:
-            low = middle
+            low = tried
+        tried = 0.5 * (low + high)
     return high
 
 
@@ -398,7 +404,8 @@ def gap_ahead(world: World, i: int, clock: float, box: Floats, pose: Floats) -> 
             if along <= 0.0:
                 break
             contact = _contact_clock(world, i, k, clock, box)
-            return max(way_at(world, i, contact) - start, 0.0), k
+            if contact < np.inf:
+                return max(way_at(world, i, contact) - start, 0.0), k
     return np.inf, -1
 
 

@@ -108,6 +108,43 @@ def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
 
 
 @kernel(inline=True)
+def passing_acceleration(
+    world: World,
+    parameters: DriverParameters,
+    i: int,
+    place: Floats,
+    way: float,
+    speed: float,
+    ego: Floats,
+) -> float:
+    """Return the acceleration [m/s²] of driver i that lets the predicted ego (M, 5) pass a place.
+
+    -infinity if the ego does not leave the place, or if the driver can no longer stop before it.
+
+    Args:
+        world: the scenario.
+        parameters: of the drivers.
+        i: index of the driver.
+        place: (7,) footprint of the driver there.
+        way: to the place [m].
+        speed: of the driver [m/s].
+        ego: as `predict_ego` writes it.
+    """
+    stopping_way = speed * MODEL.foot_time_s + speed * speed / (2.0 * parameters.strongest[i])
+    if stopping_way > way:
+        return -np.inf
+    box = np.empty(7)
+    half = world.half[world.ego]
+    last = ego.shape[0] - 1
+    for m in range(last, -1, -1):
+        fill_box(ego[m, 0], ego[m, 1], ego[m, 2], half[0], half[1], box)
+        if boxes_meet(place, box):
+            wait = (m + 1) * world.step + MODEL.foot_time_s
+            return approach_acceleration(parameters, i, way, speed, wait) if m < last else -np.inf
+    return -np.inf
+
+
+@kernel(inline=True)
 def meeting_acceleration(
     world: World, parameters: DriverParameters, driver: DriverState, speed: float, ego: Floats
 ) -> float:
@@ -120,7 +157,8 @@ def meeting_acceleration(
     pose = np.empty(5)
     box = np.empty(7)
     footprint = np.empty(7)
-    clearance = MODEL.clearance_m * (driver.rate != 1.0)
+    is_fast = speed > MODEL.max_blocking_speed_mps
+    clearance = MODEL.clearance_m * (driver.rate != 1.0 and is_fast)
     half = world.half[i]
     ego_half = world.half[world.ego]
     reach = np.hypot(half[0], half[1]) + np.hypot(ego_half[0], ego_half[1]) + clearance
@@ -142,7 +180,11 @@ def meeting_acceleration(
         if dx * footprint[2] + dy * footprint[3] > 0.0:
             gap = way_at(world, i, clock) - way_at(world, i, driver.clock)
             along = ego[m, 3] * max(same_direction, 0.0)
-            return following_acceleration(parameters, i, gap, speed, along, 0.0)
+            bound = following_acceleration(parameters, i, gap, speed, along, 0.0)
+            if same_direction >= MODEL.same_direction_ratio:
+                return bound
+            behind = passing_acceleration(world, parameters, i, footprint, gap, speed, ego)
+            return max(bound, behind)
         if same_direction >= MODEL.same_direction_ratio:
             break
     return np.inf

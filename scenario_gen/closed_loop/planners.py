@@ -17,6 +17,7 @@ from scenario_gen.method.evaluation import (
     STANDSTILL_MPS,
     wanted_speeds,
 )
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.types import SignalState
@@ -76,8 +77,9 @@ class ConstantSpeed(RouteFollower):
 class IdmFollower(RouteFollower):
     """Follows its route at a safe distance from the vehicles on it (IDM), and stops at red.
 
-    It also reacts to vehicles that will be on the route if they drive straight on. `speed` [m/s]
-    is its speed on a free and straight road.
+    It also lets vehicles pass that will be on the route if they drive straight on, unless it
+    clears their way `margin` [s] before them. `speed` [m/s] is its speed on a free and straight
+    road.
 
     Source: intelligent driver model, Treiber, Hennecke & Helbing 2000.
     """
@@ -85,8 +87,9 @@ class IdmFollower(RouteFollower):
     speed: float = 10.0
     headway: float = 1.5  # s
     standstill: float = 3.0  # m
-    acceleration: float = 1.5  # m/s²
-    foresight: float = 4.0  # s, horizon of the prediction that others drive straight on
+    acceleration: float = 2.0  # m/s²
+    foresight: float = 6.0  # s, horizon of the prediction that others drive straight on
+    margin: float = 1.5  # s
     room: float = 0.5  # m, lateral clearance
 
     def act(self, observation: Observation) -> Command:
@@ -141,7 +144,8 @@ class IdmFollower(RouteFollower):
         """Return the gap [m] to the next vehicle on the route, and its speed along it [m/s].
 
         A vehicle that enters the route from the side counts at the place of its entry, unless the
-        ego passes there first. Infinity and 0 if the route is free.
+        ego clears it before. Where the ego can no longer stop, it need not be so early. Infinity
+        and 0 if the route is free.
         """
         if self.route is None or not seen.ids:
             return math.inf, 0.0
@@ -159,8 +163,11 @@ class IdmFollower(RouteFollower):
         lateral_gap = np.abs(offset.reshape(shape)) - lateral_reach
         direction = np.cos(turn[:, 0])
         crosses = direction[:, None] < 0.7
-        reach = seen.ego.speed * times + 0.5 * self.acceleration * times**2
-        before_ego = reach < gap + 4.0 * half_length
+        clear = gap + 2.0 * extent
+        can_stop = gap > seen.ego.speed**2 / (2.0 * MAX_BRAKING_MPS2)
+        is_close = self._driven(seen.ego.speed, times - self.margin) < clear
+        is_first = self._driven(seen.ego.speed, times) < clear
+        before_ego = is_first | (is_close & can_stop)
         on_route = (lateral_gap < self.room) & (gap > -half_length)
         counts = on_route & ((times == 0.0) | (crosses & before_ego))
         entry_gap = gap[np.arange(len(gap)), counts.argmax(axis=1)]
@@ -168,6 +175,12 @@ class IdmFollower(RouteFollower):
         k = int(first_gap.argmin())
         speed = float(seen.others[k, 3]) * max(float(direction[k]), 0.0)
         return max(float(first_gap[k]), 0.0), speed
+
+    def _driven(self, speed: float, times: Floats) -> Floats:
+        """Return the ways (T,) [m] after times (T,) [s] of an ego that accelerates freely."""
+        times = np.maximum(times, 0.0)
+        speeding = np.minimum(times, max(self.speed - speed, 0.0) / self.acceleration)
+        return speed * times + self.acceleration * speeding * (times - 0.5 * speeding)
 
 
 @dataclass

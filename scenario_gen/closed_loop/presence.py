@@ -121,7 +121,8 @@ def _is_in_place(
     gap, _ = gap_ahead(world, i, begin, box, pose)
     excess = max(pose[3] * pose[3] - other_along * other_along, 0.0)
     response = max(pose[3] - other_along, 0.0) * parameters.delay[i] * world.step
-    room = response + pose[3] * MODEL.foot_time_s + excess / (2.0 * parameters.comfortable[i])
+    braking = MODEL.braking_margin_ratio * excess / (2.0 * parameters.comfortable[i])
+    room = response + pose[3] * MODEL.foot_time_s + braking
     return bool(gap < parameters.standstill + room)
 
 

@@ -46,7 +46,9 @@ from scenario_gen.types import (
 )
 
 OPEN_S = (3.0, 4.5, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 16.5)
-"""Times at which the reference drive enters the gap."""
+"""Times at which the reference drive enters the gap of a stream that it crosses."""
+MERGE_S = (3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 24.0, 27.0, 30.0)
+"""Those of a stream that it joins: no queue follows, so speed laws pass for longer."""
 QUEUE_S = (1.5, 5.5)  # of the ego behind the conflict area, alternately
 TRIED_PER_KEPT_COUNT = 5  # valid scenarios of a template, before it is given up
 MAX_LAW_SHARE = 0.1  # of a set that tests, which a speed law may pass
@@ -185,10 +187,11 @@ class Testing:
         config = updated(self.config, sampling)
         road = self.road
         plans = []
-        for k, time in enumerate(OPEN_S):
+        times = MERGE_S if stream.joins else OPEN_S
+        for k, time in enumerate(times):
             queue = 0.0 if stream.joins else QUEUE_S[k % len(QUEUE_S)]
             try:
-                template = stream.open_at(time, queue, 1.0 / len(OPEN_S))
+                template = stream.open_at(time, queue, 1.0 / len(times))
                 if road == AUTO:
                     parts = segment(template, config.segmentation, self.seed)
                     names = suitable_roads(Situation.of(template), parts, config)

@@ -193,8 +193,8 @@ class ClosedLoop:
         conflicts = find_conflicts(scenario, pairs)
         self.conflicts = {sum(conflict.pair) - self.ego: conflict for conflict in conflicts}
         self.insists = insisting(scenario, self.ego, self.conflicts)
-        self.reactions = self._reaction_times()
         self.traits = driver_traits(scenario, config)
+        self.reactions = self._reaction_times()
         self.parameters = self._driver_parameters()
         self._slowest = int(self.parameters.delay.max())
         self._sizes = 2.0 * self.world.half
@@ -221,13 +221,16 @@ class ClosedLoop:
         return np.interp(clocks, np.arange(len(distances)) * self.world.cell, distances)
 
     def _reaction_times(self) -> Floats:
-        """Return (N,) reaction times [s]; 0 for pedestrians and for all vehicles in a replay."""
+        """Return (N,) reaction times [s]; 0 for pedestrians and for all vehicles in a replay.
+
+        A driver who follows closely is attentive: it reacts within its time gap.
+        """
         config = self.config
         times = []
         for vehicle in self.scenario.vehicles:
             reacts = config.policy != REPLAY and not vehicle.kind.walks
             times.append(reaction_time(self.scenario, vehicle.id, config.reaction * reacts))
-        return np.array(times)
+        return np.minimum(times, self.traits.headway)
 
     def _driver_parameters(self) -> DriverParameters:
         config = self.config

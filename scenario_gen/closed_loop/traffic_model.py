@@ -27,6 +27,7 @@ from scenario_gen.closed_loop.driver import (
     DriverState,
     EGO_CLOCK,
     EGO_RATE,
+    gap_ahead,
     HELD,
     leader_acceleration,
     MODEL,
@@ -38,6 +39,7 @@ from scenario_gen.closed_loop.driver import (
 from scenario_gen.closed_loop.foresight import (
     ego_end,
     meeting_acceleration,
+    passing_acceleration,
     place_to_wait,
     predict_ego,
     yielding_acceleration,
@@ -213,6 +215,11 @@ def _bound_by_ego(
     bound = leader_acceleration(
         world, parameters, driver, pose, world.ego, box, ego[0, 3], -seen[5]
     )
+    crosses = np.cos(ego[0, 2] - pose[2]) < MODEL.same_direction_ratio
+    if bound < np.inf and crosses:
+        gap, cell = gap_ahead(world, i, driver.clock, box, pose)
+        place = world.cells[i, cell, :7]
+        bound = max(bound, passing_acceleration(world, parameters, i, place, gap, speed, ego))
     waited = now.drivers[i, WAITED]
     yielding = np.inf
     if parameters.yields[i] and seen[ON_PATH] > 0.0 and ego[0, 4] < ego_end(world):

@@ -26,10 +26,11 @@ from scenario_gen.closed_loop.planners import (
 )
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.trials import read_trials, run_trials
+from scenario_gen.closed_loop.trials import read_trials, run_trials, trials_of
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.review.evaluation import evaluate_bag
+from scenario_gen.pipeline import generate
 
 
 class Steady(RouteFollower):
@@ -80,6 +81,11 @@ def test_blind_planners_fail_looking_ones_pass(bag):
     assert all(outcome.verdict.passed for outcome in run_trials(trials, IdmFollower))
     loops = [ClosedLoop(trial.scenario, trial.ego, trial.road) for trial in trials]
     assert all(judge(loop, loop.drive(ReferenceFollower(loop))).passed for loop in loops)
+
+
+def test_idm_follower_passes_ordinary_set():
+    made = generate("examples/my_log.csv", "four_way", count=12, seed=7)
+    assert all(outcome.verdict.passed for outcome in run_trials(trials_of(made, "2"), IdmFollower))
 
 
 def test_certified_laws_pass_with_reacting_others(bag):

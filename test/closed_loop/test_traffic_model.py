@@ -42,7 +42,7 @@ def touches(loop, commands, count):
 
 
 def test_reaction_times_depend_on_the_scenario():
-    scenario = draw_scenario(3)
+    scenario = crossing()
     times = [ClosedLoop(scenario, ego).reactions for ego in range(len(scenario.vehicles))]
     assert all((each == times[0]).all() for each in times) and len(set(times[0])) == len(times[0])
     turned = replace(scenario, vehicles=scenario.vehicles[::-1])
@@ -80,6 +80,25 @@ def test_follower_stops_with_room_for_reaction(speed, braking, spare, step):
         following(speed, max(need, 0.0) + speed * late + 0.6 + spare), 1, config=config
     )
     assert not touches(loop, braking_after(1, braking), int(12 / step))
+
+
+@settings(max_examples=EXAMPLES)
+@given(st.integers(0, 10**9), st.floats(3.0, 20.0), st.floats(0.3, 1.8), st.floats(1.0, 2.0))
+def test_no_follower_hits_braking_ego(seed, speed, headway, standstill):
+    loop = ClosedLoop(replace(following(speed, standstill + headway * speed), seed=seed), 1)
+    assert not touches(loop, braking_after(10, 3.5), 120)
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.2, 0.5])
+def test_others_pass_ego_beside_their_way(gap):
+    loop = ClosedLoop(crossing(), 0)
+    stop = -0.5 * loop.scenario.vehicles[0].length - 0.5 * loop.scenario.vehicles[1].width - gap
+
+    def commands(k):
+        return Pose(min(-30.0 + 0.8 * (k + 1), stop), 0.0, 0.0, 8.0 * (-29.2 + 0.8 * k < stop))
+
+    drive = states(loop, commands, 250)
+    assert not loop.hit(drive[-1]) and drive[-1].clock[1] > 9.0
 
 
 @settings(max_examples=EXAMPLES)

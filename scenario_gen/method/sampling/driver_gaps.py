@@ -113,12 +113,13 @@ class Ramp:
         if edge.gap == math.inf or config.gap_sigma == 0.0:
             return None
         begin, end = _approach(edge, rests, float(self.grid[0]))
-        step, slope = smooth_step((self.grid - begin) / (end - begin))
         share = _TUNING.approach_share if end - begin >= _TUNING.min_approach else 0.0
+        duration = max(end - begin, _TUNING.min_approach)
+        step, slope = smooth_step((self.grid - begin) / duration)
         value = 1.0 - share + share * step
-        rate = self.rate * value + self.value * share * slope / (end - begin)
+        rate = self.rate * value + self.value * share * slope / duration
         least, most = allowed_gap(edge, limits)
-        earliest = -(1.0 - MIN_RATE_RATIO) * (end - begin) / _PEAK_SLOPE_RATIO / max(share, 1e-9)
+        earliest = -(1.0 - MIN_RATE_RATIO) * duration / _PEAK_SLOPE_RATIO / max(share, 1e-9)
         if edge.stands:
             earliest = max(earliest, -limits.anticipation)
         low = max(min(least - edge.gap + _TUNING.margin, 0.0), earliest)
