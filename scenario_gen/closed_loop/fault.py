@@ -244,7 +244,7 @@ class Contact:
         longer stop comfortably.
         """
         conflict, ego = self.conflict, self.drive.ego
-        if conflict is None or conflict.first != ego or conflict.following:
+        if conflict is None or conflict.first != ego:
             return False
         comfortable = float(self.loop.traits.braking[conflict.second])
         instant = self._commitment(conflict.second, conflict.entry_second, comfortable)
