@@ -297,6 +297,22 @@ def _free_acceleration(
 
 
 @kernel(inline=True)
+def _next_stop(
+    world: World, parameters: DriverParameters, driver: DriverState, speed: float, target: float
+) -> tuple[float, float]:
+    """Return the acceleration [m/s²] with which a driver stops where it stands as certified.
+
+    Also the clock [s] up to which it skips waits: the target, or infinity if no braking suffices.
+    """
+    i = driver.vehicle
+    strongest = parameters.strongest[i]
+    way = _way_to_stand(world, i, driver.clock, target)
+    if speed * speed <= 2.0 * strongest * way or speed <= strongest * world.step:
+        return stopping_acceleration(parameters, i, way, speed), target
+    return np.inf, np.inf
+
+
+@kernel(inline=True)
 def drive_step(
     world: World,
     parameters: DriverParameters,
@@ -327,14 +343,10 @@ def drive_step(
     if not hurries and (stands or (rate == 1.0 and bound >= pose[4])):
         return DriverState(i, driver.clock + h, 1.0, pose[4] * (not stands))
     speed = rate * pose[3]
-    strongest = parameters.strongest[i]
     skipped = target
     if rate > 1.0 or hurries:
-        way = _way_to_stand(world, i, driver.clock, target)
-        if speed * speed <= 2.0 * strongest * way or speed <= strongest * h:
-            bound = min(bound, stopping_acceleration(parameters, i, way, speed))
-        else:
-            skipped = np.inf
+        stop, skipped = _next_stop(world, parameters, driver, speed, target)
+        bound = min(bound, stop)
     comfortable = parameters.comfortable[i]
     free = _free_acceleration(world, parameters.acceleration[i], driver, pose, target)
     jerk = parameters.jerk
@@ -344,7 +356,7 @@ def drive_step(
         jerk = calm + urgency * (jerk - calm)
     slowing = max(comfortable, -rate * rate * pose[4])
     gain = min(max(free, -slowing), bound, driver.acceleration + jerk * h)
-    least = max(-strongest, driver.acceleration - jerk * h)
+    least = max(-parameters.strongest[i], driver.acceleration - jerk * h)
     gain = max(gain, least, -_smooth_acceleration(speed, jerk, h))
     new_speed = max(speed + gain * h, 0.0)
     clock = clock_after(world, i, driver.clock, 0.5 * (speed + new_speed) * h, skipped)

@@ -23,7 +23,6 @@ class Origin:
 
     Attributes:
         encounter: name of the recorded encounter; "" if it is not known.
-        request: the request that a live scenario belongs to.
         digest: SHA-256 of its motion and of the ego's index; "" if not computed.
         copy_of: name of an earlier scenario from the same encounter with the same motion; ""
             without one.
@@ -44,6 +43,7 @@ class Trial:
         ego: index or id of the witness.
         road: its road, if known.
         encounter: name of the recorded encounter; "" if it is not known.
+        request: the request that a live scenario belongs to.
     """
 
     name: str

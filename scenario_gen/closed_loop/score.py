@@ -200,12 +200,7 @@ def smoothed(values: Floats, step: float, side: float, derivative: int) -> Float
     """
     if len(values) < 3:
         return np.zeros_like(values) if derivative else values.copy()
+    from scipy.signal import savgol_filter  # slow to import
+
     window = min(2 * max(round(side / step), 1) + 1, (len(values) - 1) | 1)
-    half = window // 2
-    basis = np.vander((np.arange(window) - half) * step, 3)  # t², t, 1
-    fit = np.linalg.pinv(basis)
-    for _ in range(derivative):
-        basis = np.column_stack([2.0 * basis[:, 1], basis[:, 2], np.zeros(window)])
-    weights = basis @ fit  # (window, window): one row for each place in a window
-    begin, end = weights[:half] @ values[:window], weights[half + 1 :] @ values[-window:]
-    return np.concatenate([begin, np.correlate(values, weights[half]), end])
+    return np.asarray(savgol_filter(values, window, 2, derivative, step))

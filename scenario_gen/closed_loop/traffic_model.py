@@ -108,14 +108,8 @@ def react(
         _write_driver(driver, after[i])
         if i == world.ego:
             continue
-        if not now.moving[i]:
-            if now.present[i]:
-                drive_on(world, parameters.acceleration[i], now.pose[i, 3], after[i])
-            continue
-        if not now.present[i]:
-            vehicles, clocks = _on_scene(world, now, seen[0])
-            after[i, RATE] = may_enter(world, parameters, driver, vehicles, clocks, time)
-            after[i, CLOCK] += after[i, RATE] * world.step
+        if not (now.moving[i] and now.present[i]):
+            _enter_or_leave(world, parameters, now, driver, seen[0], time, after[i])
             continue
         if min(parameters.delay[i], seen.shape[0] - 1) != age:
             age = min(parameters.delay[i], seen.shape[0] - 1)
@@ -169,9 +163,26 @@ def _on_scene(world: World, now: Traffic, seen: Floats) -> tuple[Floats, Floats]
 
 
 @kernel(inline=True)
-def _fill_ego(world: World, pose: Floats, out: Floats) -> None:
-    """Write the box (7,) of the ego at a pose (x, y, yaw, …)."""
-    fill_box(pose[0], pose[1], pose[2], world.half[world.ego, 0], world.half[world.ego, 1], out)
+def _enter_or_leave(
+    world: World,
+    parameters: DriverParameters,
+    now: Traffic,
+    driver: DriverState,
+    seen: Floats,
+    time: float,
+    out: Floats,
+) -> None:
+    """Write clock and rate (5,) of a driver that is not on the scene, or at the end of its path.
+
+    Other arguments as in `react`; `seen` (9,) is the ego now.
+    """
+    i = driver.vehicle
+    if now.moving[i]:
+        vehicles, clocks = _on_scene(world, now, seen)
+        out[RATE] = may_enter(world, parameters, driver, vehicles, clocks, time)
+        out[CLOCK] += out[RATE] * world.step
+    elif now.present[i]:
+        drive_on(world, parameters.acceleration[i], now.pose[i, 3], out)
 
 
 @kernel(inline=True, forced=True)
@@ -211,7 +222,8 @@ def _bound_by_ego(
     pose = now.pose[i]
     speed = driver.rate * pose[3]
     box = np.empty(7)
-    _fill_ego(world, ego[0], box)
+    half = world.half[world.ego]
+    fill_box(ego[0, 0], ego[0, 1], ego[0, 2], half[0], half[1], box)
     bound = leader_acceleration(
         world, parameters, driver, pose, world.ego, box, ego[0, 3], -seen[5]
     )

@@ -159,16 +159,20 @@ class DriveVerdict:
 
         A drive that passes also runs no red light and meets all criteria.
         """
-        return (
-            self.collision is None
-            and math.isnan(self.off_road)
-            and math.isnan(self.ran_red)
-            and not math.isnan(self.goal)
-            and not self.jumps
-            and not self.missed
-            and not self.error
-            and not self.took_turn
-        )
+        return not self.failure
+
+    @property
+    def events(self) -> dict[str, bool]:
+        """Which failures happened, the one that counts before others first."""
+        return {
+            "error": bool(self.error),
+            "jump": self.jumps > 0,
+            "collision": self.collision is not None,
+            "off_road": not math.isnan(self.off_road),
+            "ran_red": not math.isnan(self.ran_red),
+            "took_turn": self.took_turn,
+            "goal": math.isnan(self.goal),
+        } | {result.name: True for result in self.missed}
 
     @property
     def at_fault(self) -> bool:
@@ -182,21 +186,7 @@ class DriveVerdict:
         One of: error, jump, collision, off_road, ran_red, took_turn, goal, the name of a
         criterion.
         """
-        if self.error:
-            return "error"
-        if self.jumps:
-            return "jump"
-        if self.collision is not None:
-            return "collision"
-        if not math.isnan(self.off_road):
-            return "off_road"
-        if not math.isnan(self.ran_red):
-            return "ran_red"
-        if self.took_turn:
-            return "took_turn"
-        if math.isnan(self.goal):
-            return "goal"
-        return self.missed[0].name if self.missed else ""
+        return next((name for name, happened in self.events.items() if happened), "")
 
     @property
     def fault(self) -> str:
@@ -222,12 +212,10 @@ class DriveVerdict:
         missed goal, missed criteria, and the least time to collision.
         """
         hit = self.collision.speed if self.collision else -1.0
+        happened = self.events
         return (
             hit,
-            float(not math.isnan(self.off_road)),
-            float(not math.isnan(self.ran_red)),
-            float(self.took_turn),
-            float(math.isnan(self.goal)),
+            *(float(happened[name]) for name in ("off_road", "ran_red", "took_turn", "goal")),
             float(len(self.missed)),
             -self.min_ttc,
             -self.min_gap,
