@@ -44,6 +44,15 @@ def over(y, to, at, length=25.0):
     return np.column_stack([x, y + (to - y) * share * share * (3.0 - 2.0 * share)])
 
 
+def turn(radius=8.0):
+    """Along +y, then left along -x; the turn ends at (0, 0)."""
+    angle = np.linspace(0.0, np.pi / 2, 20)
+    arc = np.column_stack([radius * np.cos(angle), radius * np.sin(angle) - radius])
+    south = np.column_stack([np.full(80, radius), np.linspace(-100.0, -radius - 1.0, 80)])
+    west = np.column_stack([np.linspace(-1.0, -100.0, 80), np.zeros(80)])
+    return np.concatenate([south, arc, west])
+
+
 def right_turn(radius):
     """Along +x, then right along -y; the turn begins at (0, 0), 100 m from the start."""
     angle = np.linspace(0.0, np.pi / 2, 20)
