@@ -30,9 +30,8 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.cdr import decode, encode
-from msg_conventions.layouts import CLOCK, VELOCITY, VELOCITY_STAMPED
-from msg_conventions.paths import read_path
-from msg_conventions.poses import poses_of
+from msg_conventions.layouts import CLOCK, PATH, VELOCITY, VELOCITY_STAMPED
+from msg_conventions.paths import timed_poses
 from msg_conventions.roads import encode_grid, OCCUPIED_CODE
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats
@@ -100,14 +99,15 @@ def decode_timed_path(data: bytes, source: str = "ego/path") -> TimedPath:
         InputError: the message is damaged or empty, a value is not finite, or the stamps do not
             ascend.
     """
-    _, frame_id, stamps, _, rows = read_path(data, source)
-    if not len(rows):
+    path = decode(PATH, data, source)
+    if not path.poses:
         raise InputError(f"{source} is empty")
+    poses, stamps = timed_poses(path, source)
     if (np.diff(stamps) <= 0).any():
         raise InputError(
             f"{source}: the poses' stamps must ascend: they are the times of the poses"
         )
-    return TimedPath(stamps.astype(np.float64), poses_of(rows, source), frame_id)
+    return TimedPath(stamps.astype(np.float64), poses, path.frame_id)
 
 
 def encode_local_map(

@@ -34,6 +34,7 @@ FIX = HEADER | {
     "covariance_type": "u1",
 }
 POSES = HEADER | {"poses": [POSE]}
+PATH = HEADER | {"poses": [HEADER | {"pose": POSE}]}
 POLYGON = HEADER | {"points": ["3f4"]}  # m
 ODOMETRY = HEADER | {"child": "string"} | KINEMATICS
 TRANSFORMS: Layout = {"transforms": [HEADER | {"child": "string", "pose": POSE}]}

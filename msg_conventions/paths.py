@@ -11,21 +11,19 @@ chords.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 
-from msg_conventions import layouts
-from msg_conventions.cdr import CdrReader, encode, HEADER
-from msg_conventions.poses import poses_of
-from msg_conventions.yaw import half_angle
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import PATH
+from msg_conventions.poses import pose_rows, poses_of
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, Ints, NS_PER_S
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
-BEGIN = layouts.HEADER | {"count": "u4"}  # of poses
 
 
 def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) -> bytes:
@@ -34,51 +32,13 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
     Raises:
         InputError: a value is not finite, or a stamp is no ROS time.
     """
-    count = len(poses)
-    if not count:
-        return encode(BEGIN, stamp=stamp_ns, frame_id=frame_id)
     if not np.isfinite(poses).all():
         raise InputError("a path with a value that is not finite cannot be sent")
-    seconds, nanoseconds = np.divmod(stamps_ns, NS_PER_S)
-    if np.abs(seconds).max() >= 2**31:
-        raise InputError(
-            f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time "
-            "(until 2038)"
-        )
-    text = frame_id.encode() + b"\x00"
-    begin = encode(BEGIN, stamp=stamp_ns, frame_id=frame_id, count=count)
-    rows = np.zeros(count, dtype=_pose_type(len(text)))
-    rows["sec"] = seconds
-    rows["nanosec"] = nanoseconds
-    rows["size"] = len(text)
-    rows["frame"] = text
-    pose = rows["pose"]
-    pose[:, :2] = poses[:, :2]
-    pose[:, 5], pose[:, 6] = half_angle(poses[:, 2])
-    body = rows.tobytes()
-    used = 12 + len(text)
-    gap = (
-        -(len(begin) - len(HEADER) + used) % 8
-    )  # before the first pose, which may begin amid 8 bytes
-    return b"".join((begin, body[:used], bytes(gap), body[used + -used % 8 :]))
-
-
-@lru_cache(maxsize=16)
-def _pose_type(size: int) -> np.dtype[np.void]:
-    """Return the layout of a pose in a frame of `size` bytes.
-
-    The pose begins and ends at a multiple of 8 bytes.
-    """
-    frame = size + -(12 + size) % 8
-    return np.dtype(
-        [
-            ("sec", "<i4"),
-            ("nanosec", "<u4"),
-            ("size", "<u4"),
-            ("frame", f"S{frame}"),
-            ("pose", "<f8", (7,)),
-        ]
-    )
+    stamped = [
+        {"stamp": stamp, "frame_id": frame_id, "pose": row}
+        for stamp, row in zip(stamps_ns.tolist(), pose_rows(poses), strict=True)
+    ]
+    return encode(PATH, stamp=stamp_ns, frame_id=frame_id, poses=stamped)
 
 
 def decode_path(data: bytes, source: str = "path") -> tuple[int, str, Floats, Ints]:
@@ -87,32 +47,24 @@ def decode_path(data: bytes, source: str = "path") -> tuple[int, str, Floats, In
     Raises:
         InputError: the message is damaged, or a pose is in another frame than the path.
     """
-    stamp_ns, frame_id, stamps, frames, rows = read_path(data, source, framed=True)
-    for k, frame in enumerate(frames):
-        if frame not in (frame_id, ""):
-            raise InputError(f"{source}: pose {k} is in frame {frame!r}, the path in {frame_id!r}")
-    return stamp_ns, frame_id, poses_of(rows, source), stamps
+    path = decode(PATH, data, source, framed=True)
+    for k, pose in enumerate(path.poses):
+        if pose.frame_id not in (path.frame_id, ""):
+            raise InputError(
+                f"{source}: pose {k} is in frame {pose.frame_id!r}, the path in {path.frame_id!r}"
+            )
+    return path.stamp, path.frame_id, *timed_poses(path, source)
 
 
-def read_path(
-    data: bytes, source: str, *, framed: bool = False
-) -> tuple[int, str, Ints, list[str], Floats]:
-    """Return stamp [ns] and frame, and each pose's stamp [ns], frame and wire row (7,).
-
-    `framed` as in `decode`.
+def timed_poses(path: SimpleNamespace, source: str) -> tuple[Floats, Ints]:
+    """Return the poses (M, 3) of a decoded path, and their stamps (M,) [ns].
 
     Raises:
-        InputError: the message is damaged.
+        InputError: a value is not finite, or a pose has no rotation.
     """
-    reader = CdrReader(data, source)
-    head = reader.fields(layouts.HEADER, framed=framed)
-    count = reader.count(68)
-    rows, stamps, frames = np.zeros((count, 7)), np.zeros(count, dtype=np.int64), []
-    for k in range(count):
-        stamps[k] = reader.stamp()
-        frames.append(reader.string())
-        rows[k] = reader.array("<f8", 7, 8)
-    return head.stamp, head.frame_id, stamps, frames, rows
+    rows = np.array([pose.pose for pose in path.poses]).reshape(-1, 7)
+    stamps = np.array([pose.stamp for pose in path.poses], dtype=np.int64)
+    return poses_of(rows, source), stamps
 
 
 def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:

@@ -70,18 +70,6 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
 )
 TOPICS = {topic: (kind, quality) for kind, quality, topics in _TABLE for topic in topics.split()}
 
-ANY_NODE = ("*",)
-PUBLISHERS: dict[str, tuple[str, ...]] = {
-    "tracks": ("log_player", "segmenter"),  # one from a log, the other from streams
-    "tracks/part": ("planner", "road_server"),
-    "ego/goal": ("gp_sampler", "traffic"),
-    **dict.fromkeys(("diagnostics", "clock", "tf", "tf_static"), ANY_NODE),
-    **dict.fromkeys(
-        ("bond", "rosout", "parameter_events", "transition_event"), ANY_NODE
-    ),  # of ROS
-}
-"""The nodes that may publish a topic at the same time; only one node publishes any other topic."""
-
 
 def vehicle_topic(token: str, name: str) -> str:
     """Return a vehicle's topic, e.g. `vehicle_7/route`."""
@@ -102,12 +90,3 @@ def topic_entry(topic: str) -> tuple[str, Quality]:
         if re.search(rf"(^|/){name}$", topic):
             return TOPICS[pattern]
     raise KeyError(topic)
-
-
-def publishers_of(topic: str) -> tuple[str, ...]:
-    """Return the names of the nodes that may publish a topic at the same time, () for one node.
-
-    The topic is given with or without a namespace.
-    """
-    matches = [name for name in PUBLISHERS if f"/{topic}".endswith(f"/{name}")]
-    return PUBLISHERS[max(matches, key=len)] if matches else ()

@@ -24,14 +24,12 @@ def main() -> None:
         return
     try:
         needs("cli", "rich", "typer")
-        from scenario_gen.base.folders.scratch import sweep_beside
         from scenario_gen.cli.commands import main as run
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 
     # The resource tracker warns when it removes the resources of a killed process.
     sys.warnoptions.append("ignore:resource_tracker")
-    sweep_beside(sys.argv[1:])
     run()
 
 

@@ -82,7 +82,7 @@ CONCEPTS = {
     ),
     "rows of the certificate": ("method/validity/dynamics.py", r"class Check\(|worst_excess\("),
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
-    "folders that replace others": ("base/folders/", r"renameat2|RENAME_EXCHANGE"),
+    "folders that replace others": ("base/folders.py", r"renameat2|RENAME_EXCHANGE"),
     "cells of a polygon": ("numerics/polygons.py", r"rasteri[sz]e\(|np\.lexsort\(\(column, row"),
     "lanes of a road that is drawn": (
         "roads/drawn.py",

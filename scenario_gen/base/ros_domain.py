@@ -13,7 +13,8 @@ import tempfile
 from filelock import FileLock, Timeout
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.base.folders.disk import own_folder
+from scenario_gen.base.folders import own_folder
+from scenario_gen.base.signals import environment_set
 
 DOMAINS = range(1, 102)  # higher domains would use ephemeral ports
 CHECKED_PARTICIPANTS_COUNT = 20  # the first participants may have ended while a later one lives
@@ -69,16 +70,11 @@ def own_domain() -> Iterator[int]:
     Raises:
         RefusedError: no domain is free.
     """
-    with free_domain() as domain:
-        variables = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
-        previous = {name: os.environ[name] for name in variables if name in os.environ}
-        os.environ.update(variables)
-        try:
-            yield domain
-        finally:
-            for name in variables:
-                os.environ.pop(name, None)
-            os.environ.update(previous)
+    with (
+        free_domain() as domain,
+        environment_set({**this_host_only(), "ROS_DOMAIN_ID": str(domain)}),
+    ):
+        yield domain
 
 
 def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str]:

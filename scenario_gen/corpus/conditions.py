@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Timer
 from typing import Any
 
+from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError
 from scenario_gen.corpus.messages import database, pattern_of, quoted, tables
 
@@ -25,7 +26,6 @@ GENERATED = "* EXCLUDE filename, parse_filename(parse_dirpath(filename))[6:] AS 
 def matching(
     paths: Sequence[Path],
     condition: str,
-    folder: Path,
     *,
     columns: str = GENERATED,
     source: object = "hits",
@@ -37,7 +37,6 @@ def matching(
     Args:
         paths: tables.
         condition: SQL over the columns.
-        folder: parent of the database's temporary folder.
         columns: of the view, in SQL.
         source: names the tables in messages.
         remedy: the end of messages.
@@ -49,7 +48,7 @@ def matching(
     task = f"{source}: condition {condition!r}"
     names = [str(path.absolute()) for path in paths]
     files = quoted([*names, *map(pattern_of, names)])
-    with database(folder, 400, task, remedy) as base, _time_limit(base, seconds, task):
+    with database(temp_folder(), 400, task, remedy) as base, _time_limit(base, seconds, task):
         base.execute(
             f"CREATE VIEW scenarios AS SELECT {columns} FROM {tables(paths, ', filename = true')}"
         )

@@ -103,13 +103,7 @@ def search(
         remedy += "; if the corpus is from an older version, mine it again"
     columns = GENERATED if generated else RECORDED
     with matching(
-        tables,
-        condition,
-        batch,
-        columns=columns,
-        source=batch,
-        remedy=remedy,
-        seconds=seconds,
+        tables, condition, columns=columns, source=batch, remedy=remedy, seconds=seconds
     ) as (base, matches):
         yield base, matches.order("pet NULLS LAST, ttc, template, road, index")
 

@@ -26,7 +26,6 @@ from typing import Any
 
 from scenario_gen.bags.recordings.write import add_results, scenario_bytes
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.corpus.conditions import matching
@@ -200,7 +199,7 @@ def _write_bag(task: PartTask, results: Mapping[str, GenerationResult]) -> None:
     """Write the requested scenarios of results to a bag; the table of scenarios is written."""
     chosen = {(name, scenario.index) for name in results for scenario in results[name]}
     if task.request.bags == "hits":
-        with matching([task.file("scenarios")], task.request.hits, temp_folder()) as (_, rows):
+        with matching([task.file("scenarios")], task.request.hits) as (_, rows):
             chosen = set(rows.project("namespace, index").fetchall())
     if not chosen:
         return

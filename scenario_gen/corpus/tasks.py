@@ -27,8 +27,16 @@ from typing import Any, Protocol, TypeVar
 from scenario_gen import __version__
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import describe, InputError, needs, of_system, ScenarioGenError
-from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
-from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
+from scenario_gen.base.folders import (
+    claimed,
+    naming,
+    PREFIX,
+    scratch,
+    sweep,
+    sync,
+    sync_tree,
+    write_text,
+)
 from scenario_gen.base.provenance import versions
 from scenario_gen.base.signals import (
     cleaned_up,
@@ -103,10 +111,10 @@ def held(out: Path) -> Iterator[None]:
     Raises:
         InputError: another run uses the folder.
     """
-    with claimed(out / f"{PREFIX}run", out), cleaned_up(partial(sweep_tree, out)):
-        sweep_tree(out)
+    with claimed(out / f"{PREFIX}run", out), cleaned_up(partial(sweep, out)):
+        sweep(out)
         yield
-        sweep_tree(out)
+        sweep(out)
 
 
 def agree(out: Path, name: str, document: Mapping[str, Any], kind: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any, overload, TYPE_CHECKING
 
 from scenario_gen.base.copies import naming_inputs, temp_folder
 from scenario_gen.base.errors import InputError, reading
-from scenario_gen.base.folders.scratch import scratch
+from scenario_gen.base.folders import scratch
 from scenario_gen.base.parameters import updated
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops, newest_last

@@ -17,7 +17,7 @@ import re
 import tempfile
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders.disk import own_folder
+from scenario_gen.base.folders import own_folder
 from scenario_gen.numerics.numba_import import numba
 
 OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}

@@ -18,7 +18,7 @@ from typing import Any, cast, TypeVar
 from filelock import FileLock
 import numpy as np
 
-from scenario_gen.base.folders.disk import sync
+from scenario_gen.base.folders import sync
 from scenario_gen.numerics.arrays import sealed
 from scenario_gen.numerics.compiling import make_ready
 from scenario_gen.numerics.kernel_cache import folder, OPTIONS, PACKAGE, sources, used_by_numba

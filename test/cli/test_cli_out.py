@@ -15,7 +15,7 @@ import time
 
 import pytest
 
-from scenario_gen.base.folders.scratch import PREFIX
+from scenario_gen.base.folders import PREFIX
 from scenario_gen.logs.synthetic import bundled
 
 GENERATE = (

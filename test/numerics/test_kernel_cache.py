@@ -12,7 +12,7 @@ import pytest
 from support.source_files import ROOT
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders.disk import own_folder
+from scenario_gen.base.folders import own_folder
 
 PROGRAM = """
 from scenario_gen.logs import gap

@@ -12,7 +12,6 @@ from support.node_server import start_nodes
 from support.suite_processes import RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from msg_conventions.topics import publishers_of
 from scenario_gen.ros.node_names import SUITE
 
 SCENARIOS = 3
@@ -60,10 +59,3 @@ def test_a_healthy_suite_is_quiet(domain, client, tmp_path):
     finally:
         for process in processes.values():
             process.kill()
-
-
-def test_topic_table_names_publishers():
-    assert publishers_of("/a/tracks") == publishers_of("tracks") == ("log_player", "segmenter")
-    assert "planner" in publishers_of("/a/tracks/part")
-    assert publishers_of("/a/planner/transition_event") == publishers_of("/tf") == ("*",)
-    assert publishers_of("/map") == publishers_of("/a/backtracks") == ()

@@ -297,14 +297,6 @@ def test_live_scenarios_use_their_road(start, client, sampler):
         driven.append(answer.message)
     assert driven == [f"scenario trial {scenario.index}" for scenario in parted]
 
-    client.announce("ego/goal")
-
-    def blamed():
-        return [status.message for status in client.statuses() if "twins" in status.name]
-
-    client.until(blamed, "a warning of the client, which is no sampler")
-    assert not [message for message in blamed() if "gp_sampler" in message]
-
 
 class ByPlace:
     """The planner: a speed that depends on where it is, so that an answer to another odometry than the last one shows."""

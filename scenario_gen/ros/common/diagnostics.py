@@ -21,7 +21,7 @@ from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, 
 from scenario_gen.base.errors import MAX_REFUSAL_CHARACTERS, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.ros.common.timers import create_steady_timer
-from scenario_gen.ros.common.topics import conflicting_publishers, create_publisher, publish
+from scenario_gen.ros.common.topics import create_publisher, publish
 
 TICK_S = 0.25  # real time after which changes are published
 FULL_PERIOD_STEPS = 4  # ticks after which all is published, changed or not
@@ -66,7 +66,6 @@ class NodeDiagnostics:
         self._changed = False
         self._unpublished: set[str] = set()  # names of findings that no message contains yet
         self._ticks = 0
-        self._twins: dict[str, list[str]] = {}  # topic -> other nodes that publish it
         self._publisher = create_publisher(node, "/diagnostics")
         create_steady_timer(node, TICK_S, self._tick)
 
@@ -215,7 +214,6 @@ class NodeDiagnostics:
         is_full = self._ticks % FULL_PERIOD_STEPS == 0
         if is_full:
             self._update()
-            self._check_twins()
             self._end_findings()
         if self._changed or is_full:
             self.publish()
@@ -230,25 +228,6 @@ class NodeDiagnostics:
                 values.pop("error", None)
                 status = Status(name, Level.OK, f"over: {entry.status.message}", values)
                 self._entries[name] = _Entry(status, monotonic())
-
-    def _check_twins(self) -> None:
-        """Warn of other nodes that publish the node's topics.
-
-        Subscribers cannot tell their messages apart.
-        """
-        twins = conflicting_publishers(self._node)
-        if twins == self._twins:
-            return
-        self._twins = twins
-        if not twins:
-            self.resolve("twins")
-            return
-        causes = "; ".join(
-            f"{topic} is also published by {' and '.join(nodes)}" for topic, nodes in twins.items()
-        )
-        message = f"{causes}; end one of the nodes, or give it another namespace"
-        values = {topic: " ".join(nodes) for topic, nodes in twins.items()}
-        self.status(Level.WARN, message, "twins", values)
 
 
 def family(name: str) -> str:

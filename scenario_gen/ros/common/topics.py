@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from msg_conventions.topics import ANY_NODE, publishers_of, topic_entry
+from msg_conventions.topics import topic_entry
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
@@ -342,20 +342,6 @@ def other_publishers(node: Node, topic: str) -> list[str]:
     with suppress(ValueError):
         names.remove(node.get_fully_qualified_name())
     return names
-
-
-def conflicting_publishers(node: Node) -> dict[str, list[str]]:
-    """Return the nodes that must not publish a topic beside this node, by topic."""
-    conflicts = {}
-    for topic in sorted({publisher.topic_name for publisher in list(node.publishers)}):
-        allowed = publishers_of(topic)
-        if allowed == ANY_NODE:
-            continue
-        partners = set(allowed) - {node.get_name()}
-        others = other_publishers(node, topic)
-        if names := [name for name in others if name.rpartition("/")[2] not in partners]:
-            conflicts[topic] = names
-    return conflicts
 
 
 def yield_to_executor(executor: Executor | None, stop: Callable[[], bool]) -> None:
