@@ -7,27 +7,17 @@ Its reader of whole files is used once the sizes that a file declares are within
 no file without a footer: of such a file the records up to the cut are read one by one.
 """
 
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from itertools import chain, zip_longest
 from operator import attrgetter
 import os
 from pathlib import Path
-import struct
 from typing import Any, BinaryIO
 
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, ChunkIndex, Footer, Message, Schema
-from mcap.stream_reader import (
-    breakup_chunk,
-    get_chunk_data_stream,
-    MAGIC_SIZE,
-    StreamReader,
-)
+from mcap.records import Channel, Chunk, Footer, Message, Schema
+from mcap.stream_reader import breakup_chunk, MAGIC_SIZE, StreamReader
 
 from scenario_gen.bags.storage.config import ReadBudget
 from scenario_gen.bags.storage.messages import BagMessage, BagTopic
@@ -37,9 +27,7 @@ from scenario_gen.base.errors import describe, guarded, InputError
 
 _MAX_STAMP_NS = 2**63  # rosbag2's stamps are signed
 _EXTRA_RECORD_BYTES = 1024  # beside the data of a chunk
-_RECORD = struct.Struct("<BQ")  # opcode and length
-_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_STAMP = attrgetter("stamp_ns")
+_SIZE_OFFSET_BYTES = 25  # of a chunk's size: behind opcode, length, and two stamps
 
 
 class McapFile:
@@ -62,8 +50,8 @@ class McapFile:
         self._path = path
         self._budget = budget
         self._end = -1  # of the whole records, once it is known
-        self._chunks: list[ChunkIndex] = []  # by time; none without a complete index
         indexed = self._indexed()
+        self._is_indexed = indexed is not None
         self.topics = self._scanned() if indexed is None else indexed
 
     def _indexed(self) -> list[BagTopic] | None:
@@ -82,9 +70,12 @@ class McapFile:
         counts = statistics.channel_message_counts
         if not chunks or statistics.chunk_count != len(chunks) or counts.keys() - summary.channels:
             return None
-        for chunk in chunks:
-            self._check_size(chunk)
-        self._chunks = sorted(chunks, key=attrgetter("message_start_time"))
+        offsets = [chunk.chunk_start_offset for chunk in chunks]
+        if max(offsets) >= self._size or not all(each.message_index_offsets for each in chunks):
+            return None
+        for offset in offsets:
+            self._stream.seek(offset + _SIZE_OFFSET_BYTES)
+            self._check_size(int.from_bytes(self._stream.read(8), "little"))
         return self._topics(summary.schemas, summary.channels, counts)
 
     def _scanned(self) -> list[BagTopic]:
@@ -138,20 +129,20 @@ class McapFile:
                     raise McapError(f"{rest} bytes follow the footer")
                 return
             if isinstance(record, Chunk):
-                self._check_size(record)
+                self._check_size(record.uncompressed_size)
                 yield from breakup_chunk(record, validate_crc=True)
             else:
                 yield record
             if self._stream.tell() == self._end:
                 return
 
-    def _check_size(self, chunk: Any) -> None:
-        """Check the declared size of a chunk or of its index.
+    def _check_size(self, size: int) -> None:
+        """Check the size that a chunk declares.
 
         Raises:
             InputError: it, or that of all, is above the bounds.
         """
-        size, max_bytes = chunk.uncompressed_size, self._budget.config.most_chunk_bytes
+        max_bytes = self._budget.config.most_chunk_bytes
         if size > max_bytes:
             raise InputError(
                 f"{self._path}: a chunk of {size} bytes; bag.most_chunk_bytes is {max_bytes}"
@@ -190,70 +181,29 @@ class McapFile:
             InputError: the file is damaged, or larger than the bounds allow.
         """
         by_id = {topic.id: topic for topic in topics}
-        parts = self._parts_by_time(by_id)
         n_missing = sum(topic.count for topic in topics)
         remedy = f"`mcap recover {self._path.name}` saves what is whole"
         with guarded(f"{self._path}: damaged", remedy=remedy):
-            for part in parts:
-                if part and part[-1].stamp_ns >= _MAX_STAMP_NS:
-                    raise McapError(f"log time {part[-1].stamp_ns} ns is out of range")
-                n_missing -= len(part)
-                yield from part
+            for message in self._by_time({topic.name for topic in topics}):
+                topic = by_id.get(message.channel_id)
+                if topic is None:
+                    continue
+                if message.log_time >= _MAX_STAMP_NS:
+                    raise McapError(f"log time {message.log_time} ns is out of range")
+                n_missing -= 1
+                yield BagMessage(topic.name, topic.type, message.data, message.log_time)
             if n_missing > 0:
                 raise McapError(f"{n_missing} messages cannot be read")
 
-    def _parts_by_time(self, by_id: Mapping[int, BagTopic]) -> Iterator[list[BagMessage]]:
-        """Yield the messages of some topics by their stamps, in parts."""
-        if not self._chunks:
-            records = (each for each in self._records() if isinstance(each, Message))
-            messages = [
-                BagMessage(by_id[m.channel_id].name, by_id[m.channel_id].type, m.data, m.log_time)
-                for m in records
-                if m.channel_id in by_id
-            ]
-            yield sorted(messages, key=_STAMP)
+    def _by_time(self, names: Collection[str]) -> Iterator[Message]:
+        """Yield the messages by time; of a whole file those of some topics, chunk by chunk."""
+        self._stream.seek(0)
+        if self._is_indexed:
+            reader = SeekingReader(self._stream, validate_crcs=True, record_size_limit=self._size)
+            yield from (message for _, _, message in reader.iter_messages(names))
             return
-        offsets = [chunk.message_index_offsets for chunk in self._chunks]
-        used = [
-            chunk
-            for chunk, channels in zip(self._chunks, offsets, strict=True)
-            if not channels or not channels.keys().isdisjoint(by_id)
-        ]
-        starts = [chunk.message_start_time for chunk in used[1:]]
-        pending: list[BagMessage] = []
-        for chunk, next_start in zip_longest(used, starts, fillvalue=2**64):
-            pending = sorted(chain(pending, self._messages_in(chunk, by_id)), key=_STAMP)
-            n_ready = bisect_left(pending, next_start, key=_STAMP)
-            yield pending[:n_ready]
-            pending = pending[n_ready:]
-
-    def _messages_in(
-        self, index: ChunkIndex, by_id: Mapping[int, BagTopic]
-    ) -> Iterator[BagMessage]:
-        """Yield the messages of some topics in a chunk; mcap's own loop takes ten times as long.
-
-        Raises:
-            McapError: the chunk is damaged.
-        """
-        self._stream.seek(index.chunk_start_offset + _RECORD.size)
-        chunk = Chunk.read(ReadDataStream(self._stream))
-        if chunk.uncompressed_size != index.uncompressed_size:
-            raise McapError("the index has another size of a chunk")
-        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-        data = stream.read(size)
-        end = 0
-        while end < size:
-            opcode, length = _RECORD.unpack_from(data, end)
-            begin, end = end + _RECORD.size, end + _RECORD.size + length
-            if opcode != Opcode.MESSAGE:
-                continue
-            channel, _, stamp_ns, _ = _MESSAGE_HEAD.unpack_from(data, begin)
-            topic = by_id.get(channel)
-            if topic is not None:
-                content = data[begin + _MESSAGE_HEAD.size : end]
-                yield BagMessage(topic.name, topic.type, content, stamp_ns)
-        if end > size:
-            raise McapError("a chunk ends within a record")
+        records = (each for each in self._records() if isinstance(each, Message))
+        yield from sorted(records, key=attrgetter("log_time"))
 
 
 def _profiles(text: str) -> Any:
