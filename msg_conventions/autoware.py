@@ -84,10 +84,10 @@ class AutowareEncoder:
         ]
         return encode(TRACKED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
 
-    def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
-        """Return vehicle `n` at instant `k` as the ego's Odometry."""
+    def odometry(self, k: int, stamp_ns: int) -> bytes:
+        """Return the first vehicle at instant `k` as the ego's Odometry."""
         return encode_kinematic_state(
-            self.scenario.vehicles[n], self.states[n, k], self.scenario.frame_id, stamp_ns
+            self.scenario.vehicles[0], self.states[0, k], self.scenario.frame_id, stamp_ns
         )
 
     def _horizon(self, n: int, k: int) -> list[int]:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""visualization_msgs/Marker: lines, boxes and texts for RViz and Foxglove."""
+"""visualization_msgs/Marker: lines and boxes for RViz and Foxglove."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -17,16 +17,12 @@ ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"
 
 
 class Kind(IntEnum):
-    """Types of markers.
-
-    A text faces the viewer, and the last number of its scale is its height.
-    """
+    """Types of markers."""
 
     CUBE = 1
     CYLINDER = 3
     LINE_STRIP = 4
     LINE_LIST = 5
-    TEXT = 9
 
 
 class Action(IntEnum):
@@ -49,7 +45,6 @@ class Marker:
         scale: length, width, height of a box, or the width of a line first [m].
         colour: red, green, blue, alpha, from 0 to 1.
         points: (P, 2) [m] of lines.
-        text: shown by a text marker; data for programs in others.
     """
 
     name: str
@@ -59,7 +54,6 @@ class Marker:
     scale: tuple[float, float, float] = (0.1, 0.0, 0.0)
     colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     points: Floats = field(default_factory=lambda: np.zeros((0, 2)))
-    text: str = ""
 
     def fields(self, frame_id: str, stamp_ns: int) -> dict[str, Any]:
         """Return the fields of `layouts.MARKER`."""
@@ -71,6 +65,5 @@ class Marker:
             "pose": pose_rows(np.array([self.pose])),
         }
         return given | {
-            name: getattr(self, name)
-            for name in ("name", "kind", "action", "scale", "colour", "text")
+            name: getattr(self, name) for name in ("name", "kind", "action", "scale", "colour")
         }

@@ -198,13 +198,13 @@ def parse_json(text: str, source: str, schema: Mapping[str, Any]) -> Any:
     return value
 
 
-def read_json(path: Path, schema: Mapping[str, Any], source: str = "") -> Any:
+def read_json(path: Path, schema: Mapping[str, Any]) -> Any:
     """Return the value of a JSON file, as `parse_json` does.
 
     Raises:
         InputError: likewise, or the file cannot be read.
     """
-    source = source or str(path)
+    source = str(path)
     return parse_json(read_text(path, MAX_JSON_BYTES, source), source, schema)
 
 
@@ -228,21 +228,6 @@ def _check_schema(value: Any, source: str, schema: Mapping[str, Any]) -> None:
         f"{source}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks "
         f"for {rule}"
     )
-
-
-def check_shape(value: Any, shape: tuple[int, ...], source: str) -> None:
-    """Check nested lists against the shape of an array.
-
-    Raises:
-        InputError: there are more or fewer items somewhere.
-    """
-    if not shape:
-        return
-    if not isinstance(value, list) or len(value) != shape[0]:
-        content = f"{len(value)} items" if isinstance(value, list) else shown(value)
-        raise InputError(f"{source} holds {content} where {shape[0]} are needed")
-    for k, item in enumerate(value) if shape[1:] else ():
-        check_shape(item, shape[1:], f"{source}[{k}]")
 
 
 def shown(value: Any, most: int = 80) -> str:

@@ -16,7 +16,6 @@ from scenario_gen.bags.recordings.read import (
 )
 from scenario_gen.bags.recordings.template import decode_template, NEEDED
 from scenario_gen.bags.storage.bag import naming_bag
-from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.provenance import read_parameters
@@ -29,18 +28,23 @@ from scenario_gen.types import Planned, Request
 
 
 def recorded_scenarios(
-    bag: Path, wanted: Iterable[tuple[str, int]], config: BagConfig = BagConfig()
+    bag: Path, wanted: Iterable[tuple[str, int]]
 ) -> Iterator[tuple[tuple[BagMessage, ...], str]]:
     """Yield the messages of scenarios in a bag, and their SHA-256, by namespace and index.
 
     Raises:
-        InputError: one is missing or ambiguous.
+        InputError: one is missing, or its request was not closed.
     """
     with naming_bag(bag):
-        entries = _entries(bag, config)
+        entries = {(each[0].name, each[1].index): each for each in _entries(bag)}
         for namespace, index in wanted:
-            published = _find(bag, entries, index, namespace, None)
-            yield published.messages, published.entry.sha256
+            if (namespace, index) not in entries:
+                known = [str(number) for name, number in sorted(entries) if name == namespace]
+                raise InputError(
+                    f"{bag}: no scenario {index}; it has: {', '.join(known) or 'none there'}"
+                )
+            where, entry, info = entries[namespace, index]
+            yield where.messages_of(info, entry, _summary_of(where, entry)), entry.sha256
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,21 +57,18 @@ class Replanned:
     limits: Limits
 
 
-def replanned(
-    bag: Path, namespace: str | None = None, config: BagConfig = BagConfig()
-) -> Replanned:
+def replanned(bag: Path, namespace: str | None = None) -> Replanned:
     """Return the source of the scenarios of a bag; of its first request, if it has several.
 
     Args:
         bag: folder of the bag.
         namespace: needed if several namespaces have scenarios.
-        config: limits on the size of the bag.
 
     Raises:
         InputError: the bag or a required message is missing, or several namespaces have scenarios.
     """
     with naming_bag(bag):
-        entries = _entries(bag, config)
+        entries = _entries(bag)
         decisions = {where.name: entry.facts.decision for where, entry, _ in entries}
         names = sorted(decisions)
         if namespace is None and len(names) > 1:
@@ -76,89 +77,67 @@ def replanned(
                 f"{bag}: {len(names)} namespaces hold scenarios; choose one: --namespace "
                 f"{' or '.join(known)}"
             )
-        matching = [entry for where, entry, _ in entries if namespace in (None, where.name)]
-        if not matching:
-            raise InputError(
-                f"{bag}: no namespace {namespace!r}; there is {', '.join(map(repr, names))}"
-            )
-        first = matching[0]
-        published = _find(bag, entries, first.index, namespace, first.request)
-        source = _replan(published, f"{bag}: request {published.entry.request}")
-        entry, planned = published.entry, source.planned
-        encounter = planned.encounter
-        encounter = replace(encounter, name=entry.template or encounter.name)
-        planned = replace(
-            planned,
-            encounter=encounter,
-            road=replace(planned.road, name=entry.road or planned.road.name),
+        for where, entry, info in entries:
+            if namespace in (None, where.name):
+                return _replan(where, entry, info, f"{bag}: request {entry.request}")
+        raise InputError(
+            f"{bag}: no namespace {namespace!r}; there is {', '.join(map(repr, names))}"
         )
-        return replace(source, planned=planned)
 
 
-def _replan(published: "_Published", origin: str) -> Replanned:
+def _replan(where: Namespace, entry: ScenarioEntry, info: BagMessage, origin: str) -> Replanned:
     """Return the source of a scenario; `origin` names bag and request in messages."""
-    values, seed = dict(published.summary.provenance), published.entry.seed
-    if published.summary.ego is not None:
-        values["ego"] = published.summary.ego.id
-    requested = Request(
-        **{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)}
+    summary = _summary_of(where, entry)
+    template = _template(where, where.messages_of(info, entry, summary), origin)
+    encounter, road = template.encounter, template.road
+    encounter = replace(encounter, source=summary.source, name=entry.template or encounter.name)
+    template = replace(
+        template,
+        encounter=encounter,
+        road=replace(road, name=entry.road or road.name),
+        seed=entry.seed,
     )
-    template = published.template(origin)
+    values = dict(summary.provenance)
+    if summary.ego is not None:
+        values["ego"] = summary.ego.id
+    requested = Request(
+        **{field.name: values.get(field.name, str(field.default)) for field in fields(Request)}
+    )
     sampling = read_parameters(SamplingConfig(), values, "sampling.", origin)
     limits = read_parameters(Limits(), values, "limits.", origin)
-    planned = replace(template, seed=seed)
     if requested.moves:  # the bag's fit may belong to another request
-        encounter = template.encounter
-        segmentation = template.segmentation
-        road = template.road
+        segmentation, road = template.segmentation, template.road
         fitting = read_parameters(FittingConfig(), values, "fitting.", origin)
         planning = read_parameters(PlanningConfig(), values, "planning.", origin)
         situation = Situation.of(encounter)
         fit = fit_template(
             situation, segmentation, road, fitting, request=requested, limits=limits
         )
-        routes = plan_routes(road, fit, planning, seed, limits)
-        planned = Planned(encounter, segmentation, road, fit, routes, seed)
-    return Replanned(planned, requested, sampling, limits)
+        routes = plan_routes(road, fit, planning, entry.seed, limits)
+        template = replace(template, fit=fit, routes=routes)
+    return Replanned(template, requested, sampling, limits)
 
 
-@dataclass(frozen=True, eq=False)
-class _Published:
-    """A scenario in a bag: its entry, the summary of its request, and its messages."""
+def _template(where: Namespace, messages: Iterable[BagMessage], origin: str) -> Planned:
+    """Return the template in the messages of a scenario.
 
-    namespace: Namespace
-    entry: ScenarioEntry
-    summary: RequestSummary
-    messages: tuple[BagMessage, ...]
-
-    def template(self, origin: str) -> Planned:
-        """Return the template; `origin` names bag and request in messages.
-
-        Raises:
-            InputError: a required message is damaged, or not in the bag.
-        """
-        newest = {
-            message.topic.removeprefix(self.namespace.where("")): message.data
-            for message in self.messages
-        }
-        if missing := [topic for topic in NEEDED if topic not in newest]:
-            raise InputError(f"{origin}: the bag has no {', '.join(missing)} for this scenario")
-        template = decode_template(newest)
-        encounter = replace(template.encounter, source=self.summary.source)
-        return replace(template, encounter=encounter)
+    Raises:
+        InputError: a required message is damaged, or not in the bag.
+    """
+    newest = {message.topic.removeprefix(where.where("")): message.data for message in messages}
+    if missing := [topic for topic in NEEDED if topic not in newest]:
+        raise InputError(f"{origin}: the bag has no {', '.join(missing)} for this scenario")
+    return decode_template(newest)
 
 
-_Entry = tuple[Namespace, ScenarioEntry, BagMessage]
-
-
-def _entries(bag: Path, config: BagConfig) -> list[_Entry]:
+def _entries(bag: Path) -> list[tuple[Namespace, ScenarioEntry, BagMessage]]:
     """Return every scenario's entry with its namespace and message.
 
     Raises:
         InputError: there is none.
     """
     entries = []
-    for namespace in read_recording(bag, config).namespaces.values():
+    for namespace in read_recording(bag).namespaces.values():
         namespace.check_infos()
         entries += [
             (namespace, info, message)
@@ -172,43 +151,16 @@ def _entries(bag: Path, config: BagConfig) -> list[_Entry]:
     return entries
 
 
-def _find(
-    bag: Path, entries: Iterable[_Entry], index: int, namespace: str | None, request: str | None
-) -> _Published:
-    """Find the only scenario with this index among the entries of a bag.
+def _summary_of(where: Namespace, entry: ScenarioEntry) -> RequestSummary:
+    """Return the last summary of the request of a scenario.
 
     Raises:
-        InputError: there is none, there are several, or its request was not closed.
+        InputError: it was not closed.
     """
-    candidates = [
-        (where, entry, message)
-        for where, entry, message in entries
-        if namespace in (None, where.name) and request in (None, entry.request)
-    ]
-    same = [candidate for candidate in candidates if candidate[1].index == index]
-    if not same:
-        known = sorted({entry.index for _, entry, _ in candidates})
-        some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
-        raise InputError(
-            f"{bag}: no scenario {index}; it has: {some or 'none in that namespace and request'}"
-        )
-    if len(same) > 1:
-        places = "; ".join(
-            f"--namespace '{where.name}' --request {entry.request}" for where, entry, _ in same
-        )
-        raise InputError(f"{bag}: {len(same)} scenarios have number {index}; choose one: {places}")
-    ((where, entry, info),) = same
-    summary = next(
-        (
-            candidate
-            for candidate in reversed(where.summaries)
-            if candidate.request == entry.request
-        ),
-        None,
+    for summary in reversed(where.summaries):
+        if summary.request == entry.request:
+            return summary
+    raise InputError(
+        f"request {entry.request} was not closed on {where.where(INFO)}: its parameters are "
+        "missing"
     )
-    if summary is None:
-        raise InputError(
-            f"{bag}: request {entry.request} was not closed on {where.where(INFO)}: its "
-            "parameters are missing"
-        )
-    return _Published(where, entry, summary, where.messages_of(info, entry, summary))
