@@ -17,7 +17,6 @@ from scenario_gen.cli.options import (
     assigned_all,
     bag_at,
     Commands,
-    complete_format,
     configured,
     OUT,
     ParametersOption,
@@ -166,7 +165,6 @@ def export_scenarios(
         typer.Option(
             help="commonroad, openscenario (with OpenDRIVE), autoware, scenarionet (MetaDrive), "
             "csv or parquet.",
-            autocompletion=complete_format,
         ),
     ],
     out: Annotated[

@@ -12,7 +12,6 @@ import typer
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.cli.options import (
     Commands,
-    complete_road,
     configured,
     OUT,
     ParametersOption,
@@ -49,7 +48,6 @@ class Generate:
             "(.yaml), or a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad (.xml). "
             "Append #box=x0,y0,x1,y1, #lanelet=ID or #junction=ID for a part of a vector map. "
             "`scenario-gen roads` draws a map with suitable places. Repeatable.",
-            autocompletion=complete_road,
         ),
     ] = None
     count: Annotated[

@@ -45,28 +45,6 @@ OUT = ("--out", "-o")
 """The names of the option for a command's folder or file."""
 
 
-def complete_road(begun: str) -> list[str]:
-    """Return the roads and files whose names begin like this, for the shell."""
-    from scenario_gen.roads import ROADS
-
-    files = [f"{path}/" if path.is_dir() else str(path) for path in Path().glob(f"{begun}*")]
-    return [name for name in (*ROADS.names(), "auto", *files) if name.startswith(begun)]
-
-
-def complete_format(begun: str) -> list[str]:
-    """Return the formats of exports whose names begin like this, for the shell."""
-    from scenario_gen.output.exchange.export import EXPORTS
-
-    return [name for name in EXPORTS.names() if name.startswith(begun)]
-
-
-def complete_planner(begun: str) -> list[str]:
-    """Return the built-in planners whose names begin like this, for the shell."""
-    from scenario_gen.closed_loop.planners import BUILT_IN
-
-    return [name for name in BUILT_IN if name.startswith(begun)]
-
-
 class Commands(typer.Typer):
     """A group of commands in `--help`."""
 

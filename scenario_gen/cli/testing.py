@@ -15,7 +15,6 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.cli.options import (
     bag_at,
     Commands,
-    complete_planner,
     OUT,
     SeedOption,
     takes,
@@ -51,7 +50,6 @@ class Drive:
         typer.Option(
             help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower. With --ros: "
             "the command that starts its node. Repeatable: planners side by side.",
-            autocompletion=complete_planner,
         ),
     ]
     ego: Annotated[
@@ -243,7 +241,6 @@ class Search:
         str,
         typer.Option(
             help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower.",
-            autocompletion=complete_planner,
         ),
     ]
     budget: Annotated[

@@ -40,14 +40,12 @@ from scenario_gen.corpus.grouping import EPOCH
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import HourTask, MEETINGS, search_hour
 from scenario_gen.corpus.messages import (
-    ACCOUNT,
     DAMAGED,
     digest_of,
     identity_of,
     OTHER_CLOCK,
     parse_range,
     ranges,
-    RangeTask,
 )
 from scenario_gen.corpus.page import PAGE_COLUMNS, sketch, write_page
 from scenario_gen.corpus.schedule import (
@@ -73,11 +71,10 @@ NAMED_COUNT = 20  # files and findings of a kind that the page names
 NAMED_FILES_COUNT = 5  # that a line names
 LEFT_OUT = "left out"  # begins the causes of rows that are not used
 OTHERS = "files that are no logs"
-CHANGED = "files that changed or are gone since the last run"
 SPARSE = "hours that are not searched (few rows, wrong stamps?)"
 SHARED = "ids that several vehicles share"
 UNREAD = (DAMAGED, *UNREAD_LOGS)
-LAST = (CHANGED, OTHERS, OTHER_CLOCK, SPARSE, SHARED, QUALITY)  # findings below all others
+LAST = (OTHERS, OTHER_CLOCK, SPARSE, SHARED, QUALITY)  # findings below all others
 MAX_REJECTED_SHARE = 0.1  # of the rows of a file; one with more is damaged
 
 Note = tuple[str, str, str]
@@ -184,7 +181,6 @@ def mine(
         agree(out, ARCHIVE, {"format": 6, "parameters": _parameters(config)}, "corpus")
         log_tasks = [_log_task(paths, out / "encounters", config) for paths in logs]
         ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
-        stale = _stale_files(ranged, out)
         failed: list[str] = []
 
         def work(function: Callable[[Task], None], tasks: Sequence[Task]) -> None:
@@ -206,7 +202,6 @@ def mine(
         notes += faults
         unread = [note for note in notes if note[0] in UNREAD]
         n_files = len(messages) + len(logs) + len(unreadable)
-        notes += [(CHANGED, name, "what depends on it was done again") for name in stale]
         notes += [(OTHERS, path.name, "unpack compressed ones") for path in others]
         notes += _sparse_hours(accounts, least_rows(config))
         notes += _shared_ids(hours)
@@ -304,14 +299,6 @@ def _log_task(paths: list[Path], folder: Path, config: CorpusConfig) -> LogTask:
     name = re.sub(r"\W+", "_", paths[0].stem)[:40]
     target = folder / f"log-{name}-{digest_of([identity_of(file) for file in files])}.parquet"
     return LogTask(paths[0].stem, tuple(paths), target, config)
-
-
-def _stale_files(ranged: Sequence[RangeTask], out: Path) -> list[str]:
-    """Return the files of an earlier run that have changed or are gone."""
-    wanted = {task.target.stem for task in ranged}
-    accounts = (out / "messages").glob(ACCOUNT)
-    stale = [path for path in accounts if path.stem not in wanted]
-    return sorted({row["file"] for row in rows_of(stale, ["file"])})
 
 
 def _by_file(

@@ -8,7 +8,6 @@ import json
 import pytest
 
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.cli.options import complete_format, complete_planner, complete_road
 from scenario_gen.logs.synthetic import bundled
 
 LOG = bundled("c")
@@ -38,8 +37,3 @@ def test_generate_is_complete_and_reproducible(ran, made, tmp_path):
     assert figures["provenance"]["seed"] == "7"
     assert (tmp_path / "out" / "report.html").read_text().startswith("<!doctype html>")
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-
-
-def test_a_shell_completes_values_of_options():
-    assert set(complete_road("t_")) == {"t_intersection"} and "auto" in complete_road("a")
-    assert complete_format("com") == ["commonroad"] and complete_planner("I") == ["IdmFollower"]

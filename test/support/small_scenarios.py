@@ -71,7 +71,7 @@ def one_vehicle():
 
 
 def case_of(scenario, ego=None, lane_map=None):
-    one = Exported(3, 7, "ab" * 32, scenario, ego, driven=False)
+    one = Exported(3, 7, "ab" * 32, scenario, ego)
     border = np.array([[-100.0, 100.0], [200.0, 100.0]])
     network = LaneNetwork("wide", (Lane("1", border, border - (0.0, 200.0)),))
     lanes = lane_map or LaneMap(network, "wide")

@@ -50,7 +50,7 @@ def test_trailer_travels_in_joint_names():
     rows = [[0.0, 0.0, 0.0, 5.0, 0.0, 0.1], [-40.0, 0.0, 0.0, 5.0, 0.0, 0.0]]
     case, exported = case_of(moving(rows, vehicles=[TRUCK, CAR]))
     others = exported.others.with_trailers()
-    exported = Exported(3, 7, "", others, None, driven=False)
+    exported = Exported(3, 7, "", others, None)
     root = ET.fromstring(write_openscenario(case, exported, "road.xodr"))
     vehicles = [each.get("vehicleCategory") for each in root.iter("Vehicle")]
     assert vehicles == ["truck", "car", "trailer"]

@@ -37,7 +37,6 @@ class Exported:
         sha256: SHA-256 of its message in the bag.
         others: the vehicles around the ego, and their trailers; all vehicles without an ego.
         ego: the ego's track, a scenario of one vehicle with the same first instant.
-        driven: whether the ego's track is a part of the scenario, validated with the others.
     """
 
     index: int
@@ -45,7 +44,6 @@ class Exported:
     sha256: str
     others: Scenario
     ego: Scenario | None
-    driven: bool
 
     @property
     def everybody(self) -> Scenario:
@@ -185,17 +183,15 @@ def _groups(space: Namespace, export: ExportConfig) -> Iterator[_Group]:
         stamp, scenario = space.scenario(k)
         key = (stamp, entry and entry.template_hash, entry and entry.map_hash)
         group = groups.setdefault(key, _Group(stamp, entry, []))
-        others, ego, driven = _with_ego(space, entry, scenario, export.ego)
-        group.scenarios.append(
-            Exported(scenario.index, scenario.seed, sha256, others, ego, driven)
-        )
+        others, ego = _with_ego(space, entry, scenario, export.ego)
+        group.scenarios.append(Exported(scenario.index, scenario.seed, sha256, others, ego))
     yield from groups.values()
 
 
 def _with_ego(
     space: Namespace, entry: ScenarioEntry | None, scenario: Scenario, requested: str
-) -> tuple[Scenario, Scenario | None, bool]:
-    """Return the vehicles around the ego, its track, and whether it is a part of the scenario.
+) -> tuple[Scenario, Scenario | None]:
+    """Return the vehicles around the ego, and its track.
 
     Raises:
         InputError: the requested ego is not a vehicle of the scenario or its only one, another ego
@@ -215,9 +211,9 @@ def _with_ego(
                 f"{where} was generated for ego {slot!r}, whose track is missing on "
                 f"{space.where(WITNESS)}"
             )
-        return replace(scenario, reference_drive=None), track, True
+        return replace(scenario, reference_drive=None), track
     if not requested:
-        return scenario, None, False
+        return scenario, None
     if requested not in ids:
         raise InputError(
             f"{where} has no vehicle {requested!r} for --ego; it has: {', '.join(ids)}"
@@ -226,8 +222,7 @@ def _with_ego(
         raise InputError(
             f"{where} has only vehicle {requested!r}, so there would be none around the ego"
         )
-    others, ego = split_off(scenario, ids.index(requested))
-    return others, ego, True
+    return split_off(scenario, ids.index(requested))
 
 
 def _case(

@@ -26,8 +26,6 @@ from scenario_gen.ros.common.topics import create_publisher, publish
 TICK_S = 0.25  # real time after which changes are published
 FULL_PERIOD_STEPS = 4  # ticks after which all is published, changed or not
 MIN_SHOWN_S = 3.0  # for which a finding is shown at least
-MAX_STATUSES_COUNT = 100  # of a node
-MAX_VALUES_CHARACTERS = 65_536  # of one status
 
 
 @dataclass(frozen=True)
@@ -178,18 +176,18 @@ class NodeDiagnostics:
     def _add(self, status: Status) -> None:
         if not self._enabled:
             return
+        status = _presentable(status)
         old = self._entries.get(status.name)
         times = 1
         if status.level is Level.OK:
-            self._changed |= old is None or old.status != bounded(status)
+            self._changed |= old is None or old.status != status
         else:
             self._changed = True
             if old is not None and old.is_finding:
                 times = old.times + 1
-                status = self._repeated(status, old.status, times)
+                status = _presentable(self._repeated(status, old.status, times))
             self._unpublished.add(status.name)
-        self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
-        self._drop_excess()
+        self._entries[status.name] = _Entry(status, monotonic(), times)
 
     def _repeated(self, status: Status, old: Status, times: int) -> Status:
         """Return a finding with its count.
@@ -200,13 +198,6 @@ class NodeDiagnostics:
         if status.name in self._unpublished:
             message = old.message if message in old.message else f"{message}; {old.message}"
         return replace(status, message=message, values={**status.values, "times": str(times)})
-
-    def _drop_excess(self) -> None:
-        """Drop the oldest statuses above the limit, those that are OK first."""
-        while len(self._entries) > MAX_STATUSES_COUNT:
-            oldest = next(iter(self._entries))
-            fine = (name for name, entry in self._entries.items() if not entry.is_finding)
-            self._entries.pop(next(fine, oldest))
 
     def _tick(self) -> None:
         """Publish changes, and every second all statuses after an update."""
@@ -239,16 +230,6 @@ def family(name: str) -> str:
     return f"{node}: {subject.partition(' ')[0]}"
 
 
-def bounded(status: Status) -> Status:
-    """Return a status of bounded size with printable texts; values that do not fit are counted."""
-    room = MAX_VALUES_CHARACTERS
-    values: dict[str, str] = {}
-    for key, value in status.values.items():
-        room -= len(key) + len(value)
-        if room < 0:
-            break
-        values[key] = value
-    if missing := len(status.values) - len(values):
-        values["left_out"] = f"{missing} values, which would make the message too long"
-    message = presentable(status.message, MAX_REFUSAL_CHARACTERS)
-    return Status(status.name[:MAX_REFUSAL_CHARACTERS], status.level, message, values)
+def _presentable(status: Status) -> Status:
+    """Return a status whose message is printable and not too long."""
+    return replace(status, message=presentable(status.message, MAX_REFUSAL_CHARACTERS))
