@@ -15,7 +15,7 @@ from rclpy.node import Node
 
 from msg_conventions.autoware import AutowareEncoder, OBJECTS
 from msg_conventions.driving import encode_clock
-from msg_conventions.frames import encode_frames
+from msg_conventions.poses import encode_frames
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder, TOPICS
 from scenario_gen.base.errors import InputError
 from scenario_gen.ros.common.timers import create_steady_timer

@@ -24,8 +24,7 @@ import numpy as np
 
 from msg_conventions.cdr import encode
 from msg_conventions.layouts import PREDICTED, TRACKED
-from msg_conventions.odometry import encode_odometry
-from msg_conventions.poses import pose_rows
+from msg_conventions.poses import encode_odometry, pose_rows
 from scenario_gen.numerics import Floats
 from scenario_gen.types import height, Quality, rear_axle, Scenario, shifted, Vehicle
 

@@ -11,7 +11,7 @@ Outputs at every step, with the drive's time (that of /clock) as their stamp, in
 - `traffic/markers` (visualization_msgs/MarkerArray): a box for each vehicle, black for the ego.
 - `traffic/local_map` (nav_msgs/OccupancyGrid): the drivable cells around the ego; other vehicles
   are obstacles. Depth 1.
-- /clock (rosgraph_msgs/Clock), /tf (frames.py), `verdicts` (diagnostic_msgs/DiagnosticArray),
+- /clock (rosgraph_msgs/Clock), /tf (poses.py), `verdicts` (diagnostic_msgs/DiagnosticArray),
   `ego/goal`, `ego/route`.
 
 Inputs for the ego; a stamp of 0 means "now":

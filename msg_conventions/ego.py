@@ -18,7 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from msg_conventions.odometry import decode_odometry, encode_odometry
+from msg_conventions.poses import decode_odometry, encode_odometry
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.types import EgoSlot, token

@@ -17,12 +17,23 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.diagnostics import Level, Status
-from msg_conventions.documents import decode_document, encode_document
-from msg_conventions.hashes import hash_of, LANES, PLAN
+from msg_conventions.documents import decode_document, encode_document, hash_of, LANES, PLAN
+from msg_conventions.paths import encode_route
+from msg_conventions.topics import vehicle_topic
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Loss, Note, Route
+from scenario_gen.types import (
+    BoundaryStates,
+    Encounter,
+    Fit,
+    FittedVehicle,
+    Loss,
+    Note,
+    Route,
+    Segmentation,
+    tokens,
+)
 
 CLOSE_ANCHORS_M = 1.0  # anchors that moved less need no warning
 INPUTS = ("tracks", "changepoints", "map", LANES)
@@ -35,7 +46,7 @@ class Plan:
     Attributes:
         stamp: of the tracks [ns].
         frame_id: the road's.
-        inputs: hashes of the messages that it was made from, by topic (hashes.py).
+        inputs: hashes of the messages that it was made from, by topic (documents.py).
         anchors: (K + 2,) samples of the tracks: start, changepoints, end.
         requested: states of the vehicles in the order of the tracks.
         fitted: decisions for each vehicle, without the fitted path.
@@ -95,6 +106,32 @@ def encode_plan(
             fit.losses,
         )
     )
+
+
+def plan_messages(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    fit: Fit,
+    routes: Sequence[Route],
+    frame_id: str,
+    messages: Mapping[str, bytes],
+) -> dict[str, bytes]:
+    """Return the planner's messages by topic: the fit, the routes, and `fit/info`.
+
+    Args:
+        encounter: the template.
+        segmentation: of it.
+        fit: of it.
+        routes: of its vehicles.
+        frame_id: the road's.
+        messages: those that they were made from, by topic.
+    """
+    anchors = anchor_stamps(encounter, segmentation.changepoints)
+    planned = {"fit": encode_fit(encounter, fit, frame_id)}
+    for name, route in zip(tokens(encounter.ids), routes, strict=True):
+        planned[vehicle_topic(name, "route")] = encode_route(route, anchors, frame_id)
+    planned[PLAN] = encode_plan(encounter, fit, routes, frame_id, messages)
+    return planned
 
 
 def decode_plan(data: bytes, source: str = PLAN) -> Plan:

@@ -7,17 +7,21 @@ Frame: that of the vehicles. QoS: reliable, transient_local.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from msg_conventions.cdr import encode
 from msg_conventions.layouts import MARKERS, POLYGON
-from msg_conventions.markers import Action, Kind, Marker
+from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.types import LaneNetwork, Scenario, tokens, Vehicle
 from scenario_gen.types.markings import Marking, markings
 
+MARKER_TYPE = "visualization_msgs/msg/MarkerArray"
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 COLOURS_RGB = (
     (0.12, 0.47, 0.71),
@@ -39,6 +43,59 @@ PAINT = {
     Marking.OBSTACLE: (0.12,),
 }
 """The width of a marking, and the lengths of its dashes and gaps [m]."""
+
+
+class Kind(IntEnum):
+    """Types of markers."""
+
+    CUBE = 1
+    CYLINDER = 3
+    LINE_STRIP = 4
+    LINE_LIST = 5
+
+
+class Action(IntEnum):
+    """Actions of markers."""
+
+    ADD = 0
+    DELETE = 2
+    DELETE_ALL = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """One marker of namespace `name` and id 0.
+
+    Attributes:
+        name: namespace.
+        kind: its type.
+        action: whether it is added or deleted.
+        pose: x [m], y [m], yaw [rad].
+        scale: length, width, height of a box, or the width of a line first [m].
+        colour: red, green, blue, alpha, from 0 to 1.
+        points: (P, 2) [m] of lines.
+    """
+
+    name: str
+    kind: Kind
+    action: Action = Action.ADD
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    scale: tuple[float, float, float] = (0.1, 0.0, 0.0)
+    colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    points: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def fields(self, frame_id: str, stamp_ns: int) -> dict[str, Any]:
+        """Return the fields of `layouts.MARKER`."""
+        points = np.column_stack((self.points, np.zeros(len(self.points))))
+        given = {
+            "stamp": stamp_ns,
+            "frame_id": frame_id,
+            "points": points,
+            "pose": pose_rows(np.array([self.pose])),
+        }
+        return given | {
+            name: getattr(self, name) for name in ("name", "kind", "action", "scale", "colour")
+        }
 
 
 def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:

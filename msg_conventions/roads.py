@@ -18,12 +18,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from msg_conventions.cdr import decode, encode
-from msg_conventions.documents import decode_document, encode_document
-from msg_conventions.hashes import hash_of, LANES
+from msg_conventions.documents import decode_document, encode_document, hash_of, LANES
 from msg_conventions.layouts import MAP, POSES
-from msg_conventions.poses import pose_rows, poses_of
-from msg_conventions.trajectory import MAX_COORDINATE_M
-from msg_conventions.yaw import check_quaternions, yaw
+from msg_conventions.poses import check_quaternions, MAX_COORDINATE_M, pose_rows, poses_of, yaw
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import LaneNetwork, Road
@@ -42,7 +39,7 @@ class RoadDescription:
     Attributes:
         stamp: of the map [ns].
         frame_id: of all positions.
-        inputs: the hash of the map by its topic (hashes.py).
+        inputs: the hash of the map by its topic (documents.py).
         entries: (E, 3) x [m], y [m], yaw [rad] into the road.
         exits: (X, 3) out of it.
         lanes: those of all users, cars' lanes first; None: nothing is known of lanes.
@@ -106,6 +103,17 @@ def encode_description(road: Road, grid: bytes, stamp_ns: int) -> bytes:
     return encode_document(
         RoadDescription(stamp_ns, road.frame_id, inputs, road.entries, road.exits, lanes)
     )
+
+
+def road_messages(road: Road, stamp_ns: int) -> dict[str, bytes]:
+    """Return the messages of a road by topic."""
+    grid = encode_map(road, stamp_ns)
+    return {
+        "map": grid,
+        "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
+        "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
+        LANES: encode_description(road, grid, stamp_ns),
+    }
 
 
 def decode_description(data: bytes, source: str = LANES) -> RoadDescription:

@@ -32,15 +32,19 @@ import numpy as np
 from msg_conventions import layouts
 from msg_conventions.cdr import CdrReader, HEADER
 from msg_conventions.cdr import encode as encode_fields
-from msg_conventions.yaw import check_quaternions, quaternion, yaw
+from msg_conventions.poses import (
+    check_quaternions,
+    MAX_COMPONENT_RATIO,
+    MAX_COORDINATE_M,
+    quaternion,
+    yaw,
+)
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Bools, Floats, Ints, NS_PER_S
 from scenario_gen.types import token, tokens, TrafficLight, Trailer, usual_type, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
-MAX_COORDINATE_M = 1e8  # more than any geodetic grid has
 MAX_SPEED_MPS = 1e4  # no vehicle is faster, and sums of squares stay finite
-MAX_COMPONENT_RATIO = 2.0  # of a quaternion
 MAX_TABLE_VEHICLES = 10_000  # in a message that is decoded as one array
 MAX_DURATION_NS = 7200 * NS_PER_S  # of an encounter or a scenario
 MIN_SIZE_M = 0.01  # of a footprint

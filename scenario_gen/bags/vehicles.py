@@ -25,17 +25,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msg_conventions import layouts, odometry, topics, tracks, trajectory
+from msg_conventions import layouts, topics, tracks, trajectory
 from msg_conventions.cdr import decode
-from msg_conventions.yaw import yaw
+from msg_conventions.poses import FRAMES_TYPE, ODOMETRY_TYPE, yaw
 from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
 
-FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
+FIX, TWIST, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, trajectory.TYPE
+ODOMETRY, TRANSFORMS = ODOMETRY_TYPE, FRAMES_TYPE
 POSE = "geometry_msgs/msg/PoseStamped"
 POSE_WITH_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
-TRANSFORMS = "tf2_msgs/msg/TFMessage"
 KINDS = [
     "unknown",
     "car",

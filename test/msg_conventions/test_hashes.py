@@ -9,7 +9,7 @@ import pytest
 from support.bag_examples import hand_made_run
 from support.message_examples import encounter
 
-from msg_conventions.hashes import hash_of, head_of, LANES, PLAN, template_hashes
+from msg_conventions.documents import hash_of, head_of, LANES, PLAN, template_hashes
 from msg_conventions.roads import encode_description, encode_map
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import InputError

@@ -76,7 +76,7 @@ def test_every_canonical_heading_survives(angle):
     for value in (angle, *NASTY_HEADINGS):
         for turns in (0, 1, -3):
             canonical = canonical_angle(value) + turns * 2.0 * math.pi
-            from msg_conventions.yaw import quaternion, yaw
+            from msg_conventions.poses import quaternion, yaw
 
             back = canonical_angle(yaw(quaternion(np.array([canonical]))))
             assert back[0] == canonical_angle(value)

@@ -21,10 +21,9 @@ from msg_conventions import (
     diagnostics,
     documents,
     ego,
-    markers,
-    odometry,
     paths,
     pictures,
+    poses,
     roads,
     scenario_info,
     scenarios,
@@ -49,7 +48,7 @@ def _messages():
         yield changepoints.POSTERIOR_TYPE, changepoints.encode_posterior(template, parts)
         yield trajectory.TYPE, scenarios.encode_scenario(scenario(seed, n), 17)
         state = np.array([1.5, -2.5, 3.0, 8.25])
-        yield odometry.TYPE, ego.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
+        yield poses.ODOMETRY_TYPE, ego.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
         yield paths.TYPE, paths.encode_route(route(seed), ANCHORS, frame)
         yield paths.TYPE, paths.encode_path(np.zeros((seed - 1, 3)), np.arange(seed - 1), frame, 3)
         ends = np.array([[1.0, 2.0, 3.0]] * (seed - 1)).reshape(-1, 3)
@@ -71,7 +70,7 @@ def _messages():
         status = diagnostics.Status("/n" * seed, diagnostics.Level.OK, frame, {frame: "é" * seed})
         yield diagnostics.TYPE, diagnostics.encode_diagnostics([status] * (seed - 1), 1)
         yield pictures.FOOTPRINT_TYPE, pictures.encode_footprint(Vehicle("a"), 3, frame)
-        yield markers.ARRAY_TYPE, pictures.scenario_markers(scenario(seed), 3)
+        yield pictures.MARKER_TYPE, pictures.scenario_markers(scenario(seed), 3)
 
 
 MESSAGES = list(_messages())

@@ -10,7 +10,7 @@ import pytest
 from support.node_server import process
 from support.suite_processes import Processes, RESOURCES
 
-from msg_conventions.hashes import DOCUMENTS, hash_of
+from msg_conventions.documents import DOCUMENTS, hash_of
 from msg_conventions.scenario_info import decode_info
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags.recordings.write import result_messages

@@ -6,7 +6,7 @@
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions.frames import decode_frames, encode_frames, TYPE
+from msg_conventions.poses import decode_frames, encode_frames, TYPE
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

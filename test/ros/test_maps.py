@@ -12,7 +12,7 @@ from support.lengths import LONG
 from support.suite_processes import Client, whole_chain
 
 from msg_conventions.diagnostics import Level
-from msg_conventions.hashes import hash_of, head_of
+from msg_conventions.documents import hash_of, head_of
 from msg_conventions.scenario_info import RequestSummary
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.output.review.evaluation import evaluate_bag

@@ -10,8 +10,7 @@ import pytest
 from rclpy.parameter import Parameter
 
 from msg_conventions.cdr import encode
-from msg_conventions.documents import encode_document
-from msg_conventions.hashes import hash_of, Head
+from msg_conventions.documents import encode_document, hash_of, Head
 from msg_conventions.layouts import HEADER
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
 
-from msg_conventions.frames import decode_frames
+from msg_conventions.poses import decode_frames
 from scenario_gen.bags.recordings.write import result_messages
 
 TOPICS = ("scenarios", "scenarios/info")

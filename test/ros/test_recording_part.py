@@ -11,7 +11,7 @@ from support.map_builders import opendrive, write
 from support.suite_processes import Processes
 
 from msg_conventions.diagnostics import decode_diagnostics
-from msg_conventions.hashes import hash_of, head_of
+from msg_conventions.documents import hash_of, head_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log

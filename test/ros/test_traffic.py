@@ -19,10 +19,9 @@ from msg_conventions.cdr import encode
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.driving import encode_twist
 from msg_conventions.ego import decode_state
-from msg_conventions.frames import decode_frames
 from msg_conventions.layouts import VELOCITY_STAMPED
-from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.paths import encode_path
+from msg_conventions.poses import decode_frames, decode_odometry, encode_odometry
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, request_summary
 from scenario_gen.bags.recordings.write import result_messages, write_recording

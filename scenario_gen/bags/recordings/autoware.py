@@ -5,13 +5,13 @@
 
 from collections.abc import Iterator
 
-from msg_conventions import odometry
+from msg_conventions import poses
 from msg_conventions.autoware import AutowareEncoder, EGO, OBJECTS, QUALITY, TRACKS
 from scenario_gen.bags.storage.definitions import PREDICTED, TRACKED
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.types import Scenario
 
-TYPES = {OBJECTS: PREDICTED, TRACKS: TRACKED, EGO: odometry.TYPE}
+TYPES = {OBJECTS: PREDICTED, TRACKS: TRACKED, EGO: poses.ODOMETRY_TYPE}
 
 
 def autoware_messages(

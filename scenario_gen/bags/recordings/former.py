@@ -19,12 +19,11 @@ import numpy as np
 from msg_conventions import diagnostics, documents
 from msg_conventions.cdr import decode
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.documents import encode_document, short_hash, typed
+from msg_conventions.documents import encode_document, hash_of, LANES, PLAN, short_hash, typed
 from msg_conventions.fits import anchor_stamps, decode_fit, INPUTS, Plan
-from msg_conventions.hashes import hash_of, LANES, PLAN
 from msg_conventions.layouts import MARKER
-from msg_conventions.markers import Action
 from msg_conventions.paths import decode_route
+from msg_conventions.pictures import Action
 from msg_conventions.roads import decode_map, decode_poses, RoadDescription
 from msg_conventions.scenario_info import INFO
 from msg_conventions.topics import vehicle_topic

@@ -22,9 +22,9 @@ from msg_conventions.changepoints import (
     decode_posterior,
     segment_descriptions,
 )
+from msg_conventions.documents import DOCUMENTS, hash_of, head_of, LANES, PLAN
 from msg_conventions.ego import WITNESS
 from msg_conventions.fits import decode_plan
-from msg_conventions.hashes import DOCUMENTS, hash_of, head_of, LANES, PLAN
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import messages_of

@@ -9,8 +9,8 @@ import numpy as np
 
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decode_diagnostics, TEMPLATE, template_of
+from msg_conventions.documents import LANES, PLAN
 from msg_conventions.fits import decode_plan
-from msg_conventions.hashes import LANES, PLAN
 from msg_conventions.roads import decode_map
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError

@@ -8,19 +8,18 @@ from pathlib import Path
 
 from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
 from msg_conventions.diagnostics import encode_diagnostics
+from msg_conventions.documents import hash_of, template_hashes
 from msg_conventions.ego import ego_messages
-from msg_conventions.fits import anchor_stamps, encode_fit, encode_plan, fit_statuses
-from msg_conventions.hashes import hash_of, LANES, PLAN, template_hashes
-from msg_conventions.paths import encode_route
+from msg_conventions.fits import fit_statuses, plan_messages
 from msg_conventions.pictures import road_markers, scenario_markers
 from msg_conventions.request_messages import footprint_messages, RequestMessages
-from msg_conventions.roads import encode_description, encode_map, encode_poses
+from msg_conventions.roads import road_messages
 from msg_conventions.scenario_info import encode_info, INFO, request_summary
 from msg_conventions.scenarios import digest, encode_scenario
-from msg_conventions.topics import topic_entry, vehicle_topic
+from msg_conventions.topics import topic_entry
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
-from scenario_gen.types import Decided, Encounter, GenerationResult, Scenario, tokens
+from scenario_gen.types import Decided, Encounter, GenerationResult, Scenario
 
 
 def result_messages(
@@ -37,21 +36,12 @@ def result_messages(
     """
     road, fit = result.road_and_fit()
     encounter, stamp = result.encounter, result.encounter.start_ns
-    template = {
-        "tracks": encode_tracks(encounter),
-        "map": encode_map(road, stamp),
-        "road/entries": encode_poses(road.entries, road.frame_id, stamp),
-        "road/exits": encode_poses(road.exits, road.frame_id, stamp),
-    }
-    template[LANES] = encode_description(road, template["map"], stamp)
+    template = {"tracks": encode_tracks(encounter)} | road_messages(road, stamp)
     hashes = template_hashes(template)
     template["changepoints"] = encode_changepoints(encounter, result.segmentation)
-    template["fit"] = encode_fit(encounter, fit, road.frame_id)
-    anchors = anchor_stamps(encounter, result.segmentation.changepoints)
-    names = tokens(encounter.ids)
-    for name, route in zip(names, result.routes, strict=True):
-        template[vehicle_topic(name, "route")] = encode_route(route, anchors, road.frame_id)
-    template[PLAN] = encode_plan(encounter, fit, result.routes, road.frame_id, template)
+    template |= plan_messages(
+        encounter, result.segmentation, fit, result.routes, road.frame_id, template
+    )
     for topic, data in template.items():
         yield topic, data, stamp
     yield "road/markings", road_markers(road.lanes, road.frame_id, stamp), stamp

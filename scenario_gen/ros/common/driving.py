@@ -22,12 +22,11 @@ from msg_conventions.autoware import (
     STEP_NS,
 )
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.documents import hash_of
 from msg_conventions.ego import encode_state
-from msg_conventions.frames import encode_frames
-from msg_conventions.hashes import hash_of
-from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.paths import encode_path
 from msg_conventions.pictures import vehicle_markers
+from msg_conventions.poses import decode_odometry, encode_frames, encode_odometry
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import Info, ScenarioEntry
 from msg_conventions.topics import vehicle_topic

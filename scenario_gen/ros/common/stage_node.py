@@ -18,8 +18,8 @@ from rclpy.task import Future
 from msg_conventions import trajectory
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
+from msg_conventions.documents import DOCUMENTS, hash_of, head_of, LANES, PLAN
 from msg_conventions.fits import decode_fit, decode_plan
-from msg_conventions.hashes import DOCUMENTS, hash_of, head_of, LANES, PLAN
 from msg_conventions.roads import decode_description, decode_map
 from msg_conventions.topics import LATCHED, topic_entry
 from msg_conventions.tracks import decode_tracks

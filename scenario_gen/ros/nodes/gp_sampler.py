@@ -20,7 +20,7 @@ import os
 import threading
 
 from msg_conventions.diagnostics import Level
-from msg_conventions.hashes import hash_of, LANES, PLAN
+from msg_conventions.documents import hash_of, LANES, PLAN
 from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary
 from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher

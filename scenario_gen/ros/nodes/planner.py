@@ -21,13 +21,12 @@ from rclpy.time import Time
 
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decimal_stamp, Level
-from msg_conventions.fits import anchor_stamps, encode_fit, encode_plan, fit_statuses
-from msg_conventions.hashes import LANES, PLAN, template_hashes
-from msg_conventions.paths import encode_path, encode_route
+from msg_conventions.documents import LANES, PLAN, template_hashes
+from msg_conventions.fits import fit_statuses, plan_messages
+from msg_conventions.paths import encode_path
+from msg_conventions.poses import check_quaternions, yaw
 from msg_conventions.roads import decode_map
-from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
-from msg_conventions.yaw import check_quaternions, yaw
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
@@ -50,7 +49,7 @@ from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, Planned, Road, Segmentation, tokens
+from scenario_gen.types import Encounter, Planned, Road, Segmentation
 
 
 @dataclass(frozen=True)
@@ -121,16 +120,11 @@ class Planner(StageNode):
             return
         fit, routes = planned.fit, planned.routes
         stop_if_cancelled()
-        anchors = anchor_stamps(encounter, segmentation.changepoints)
-        results = {
-            vehicle_topic(name, "route"): encode_route(route, anchors, road.frame_id)
-            for name, route in zip(tokens(encounter.ids), routes, strict=True)
-        }
-        results["fit"] = encode_fit(encounter, fit, road.frame_id)
-        results[PLAN] = encode_plan(encounter, fit, routes, road.frame_id, messages)
-        for topic, data in results.items():
+        sent = plan_messages(encounter, segmentation, fit, routes, road.frame_id, messages)
+        for topic, data in sent.items():
             self.outputs.send(topic, data)
-        self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
+        count = len(fit.anchor_index)
+        self.get_logger().info(f"planned {len(routes)} routes through {count} anchors")
         statuses = fit_statuses(
             fit, self.get_fully_qualified_name(), template_hashes(messages), routes
         )

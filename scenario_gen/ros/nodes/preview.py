@@ -13,8 +13,8 @@ from time import monotonic
 
 import numpy as np
 
-from msg_conventions.frames import encode_frames
 from msg_conventions.pictures import vehicle_markers
+from msg_conventions.poses import encode_frames
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder, TOPICS
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.stage_node import StageNode

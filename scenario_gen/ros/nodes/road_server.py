@@ -22,9 +22,9 @@ from rclpy.serialization import deserialize_message
 
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
-from msg_conventions.hashes import LANES, template_hashes
+from msg_conventions.documents import LANES, template_hashes
 from msg_conventions.pictures import road_markers
-from msg_conventions.roads import encode_description, encode_map, encode_poses
+from msg_conventions.roads import road_messages
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
@@ -116,19 +116,13 @@ class RoadServer(StageNode):
             request_part(self, attempt, encounter, error, self.config.fitting)
             return
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
-        grid = encode_map(road, stamp_ns)
-        messages = {
-            "map": grid,
-            LANES: encode_description(road, grid, stamp_ns),
-            "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
-            "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
-            "road/markings": road_markers(road.lanes, road.frame_id, stamp_ns),
-        }
+        messages = road_messages(road, stamp_ns)
+        messages["road/markings"] = road_markers(road.lanes, road.frame_id, stamp_ns)
         stop_if_cancelled()
         for topic, data in messages.items():
             self.outputs.send(topic, data)
-        self._grid = grid
-        template = {"map": grid} | ({"tracks": tracks} if tracks else {})
+        self._grid = messages["map"]
+        template = {"map": self._grid} | ({"tracks": tracks} if tracks else {})
         height, width = road.drivable.shape
         message = (
             f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, "

@@ -5,7 +5,7 @@
 
 import pytest
 
-from msg_conventions import diagnostics, markers, paths, pictures, roads, trajectory
+from msg_conventions import diagnostics, paths, pictures, roads, trajectory
 from scenario_gen.bags.storage.definitions import definition, stored_definitions, type_store
 
 
@@ -16,6 +16,6 @@ def test_stored_definition_is_that_of_rosbags(kind):
 
 
 def test_writing_loads_no_rosbags_types():
-    kinds = {diagnostics.TYPE, markers.TYPE, markers.ARRAY_TYPE, paths.TYPE, trajectory.TYPE}
+    kinds = {diagnostics.TYPE, pictures.MARKER_TYPE, paths.TYPE, trajectory.TYPE}
     kinds |= {pictures.FOOTPRINT_TYPE, roads.MAP_TYPE, roads.POSES_TYPE}
     assert kinds <= stored_definitions().keys()
