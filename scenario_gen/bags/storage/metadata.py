@@ -42,27 +42,25 @@ class FileInfo:
         self.count += 1
 
 
-def _statistics(files: Sequence[FileInfo]) -> dict[str, Any]:
-    """Return first stamp, duration and count of files as in metadata.yaml; zeros if empty."""
-    used = [file for file in files if file.count]
-    start_ns = min((file.start_ns for file in used), default=0)
-    end_ns = max((file.end_ns for file in used), default=0)
+def _statistics(file: FileInfo) -> dict[str, Any]:
+    """Return first stamp, duration and count of a file as in metadata.yaml; zeros if empty."""
+    start_ns = file.start_ns if file.count else 0
     return {
         "starting_time": {"nanoseconds_since_epoch": start_ns},
-        "duration": {"nanoseconds": end_ns - start_ns},
-        "message_count": sum(file.count for file in used),
+        "duration": {"nanoseconds": file.end_ns - start_ns},
+        "message_count": file.count,
     }
 
 
 def metadata_yaml(
-    topics: Sequence[TopicInfo], files: Sequence[FileInfo], not_recorded: Mapping[str, str]
+    topics: Sequence[TopicInfo], file: FileInfo, not_recorded: Mapping[str, str]
 ) -> str:
     """Return the text of metadata.yaml; `not_recorded` says by topic what is missing."""
     custom = {f"{NOT_RECORDED}{topic}": text for topic, text in not_recorded.items()}
     document = {
         "version": 9,
         "storage_identifier": "mcap",
-        **_statistics(files),
+        **_statistics(file),
         "topics_with_message_count": [
             {
                 "topic_metadata": {
@@ -78,8 +76,8 @@ def metadata_yaml(
         ],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file.path for file in files],
-        "files": [{"path": file.path, **_statistics([file])} for file in files],
+        "relative_file_paths": [file.path],
+        "files": [{"path": file.path, **_statistics(file)}],
         "custom_data": custom or None,
         "ros_distro": "jazzy",
     }

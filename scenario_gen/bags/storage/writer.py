@@ -5,7 +5,6 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -22,14 +21,6 @@ from scenario_gen.types import Quality
 _WRITTEN = Kind("bag")
 
 
-@dataclass(frozen=True)
-class Split:
-    """When to begin a new file: after `bytes` of messages, or after `seconds`; 0 means never."""
-
-    bytes: int = 0
-    seconds: float = 0.0
-
-
 class BagWriter:
     """Writes one bag; a context manager.
 
@@ -38,7 +29,6 @@ class BagWriter:
     Attributes:
         folder: of the bag.
         topics: by name.
-        files: in order.
         not_recorded: by topic, what is missing.
     """
 
@@ -47,10 +37,9 @@ class BagWriter:
         folder: Path,
         *,
         compress: bool = True,
-        split: Split = Split(),
         chunk_bytes: int = 1024 * 1024,
     ) -> None:
-        """Create the folder and its first file.
+        """Create the folder and its file.
 
         Raises:
             InputError: the folder exists.
@@ -58,11 +47,7 @@ class BagWriter:
         """
         self.folder = folder
         self.topics: dict[str, TopicInfo] = {}
-        self.files: list[FileInfo] = []
         self.not_recorded: dict[str, str] = {}
-        self._compression = CompressionType.ZSTD if compress else CompressionType.NONE
-        self._chunk_bytes = chunk_bytes
-        self._split = split
         self._failed = False
         try:
             folder.mkdir(parents=True)
@@ -70,21 +55,15 @@ class BagWriter:
             raise InputError(
                 f"{folder} already exists; remove it, or name another folder for the bag"
             ) from None
-        self._open_file()
-
-    def _open_file(self) -> None:
-        self._file = FileInfo(f"{self.folder.name}_{len(self.files)}.mcap")
-        self._bytes = 0
-        self.files.append(self._file)
-        path = self.folder / self._file.path
-        with naming(path):
-            self._stream = path.open("xb")
-            self._writer = Writer(
-                self._stream, chunk_size=self._chunk_bytes, compression=self._compression
-            )
-            self._writer.start(profile="ros2", library="scenario_gen")
+        self._file = FileInfo(f"{folder.name}_0.mcap")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
+        compression = CompressionType.ZSTD if compress else CompressionType.NONE
+        path = folder / self._file.path
+        with naming(path):
+            self._stream = path.open("xb")
+            self._writer = Writer(self._stream, chunk_size=chunk_bytes, compression=compression)
+            self._writer.start(profile="ros2", library="scenario_gen")
 
     def _close_file(self) -> None:
         path = self.folder / self._file.path
@@ -95,7 +74,7 @@ class BagWriter:
         sync(path)
 
     def _metadata(self) -> str:
-        return metadata_yaml(list(self.topics.values()), self.files, self.not_recorded)
+        return metadata_yaml(list(self.topics.values()), self._file, self.not_recorded)
 
     def add_topic(
         self, name: str, kind: str, quality: Quality = Quality(), type_hash: str = ""
@@ -111,28 +90,20 @@ class BagWriter:
         Raises:
             InputError: the definition of the type is unknown.
         """
-        if name not in self.topics:
-            type_hash = type_hash or definition(kind)[1]
-            self.topics[name] = TopicInfo(name, kind, quality, type_hash)
-            self._channel(name)
-
-    def _channel(self, name: str) -> int:
-        """Return the channel of a topic in the current file; create it at its first use."""
-        if name not in self._channels:
-            topic = self.topics[name]
-            if topic.type not in self._schemas:
-                text, _ = definition(topic.type)
-                self._schemas[topic.type] = self._writer.register_schema(
-                    topic.type, "ros2msg", text.encode()
-                )
-            metadata = {
-                "offered_qos_profiles": qos_yaml(topic.quality),
-                "topic_type_hash": topic.type_hash,
-            }
-            self._channels[name] = self._writer.register_channel(
-                name, "cdr", self._schemas[topic.type], metadata
-            )
-        return self._channels[name]
+        if name in self.topics:
+            return
+        text, computed_hash = definition(kind)
+        topic = TopicInfo(name, kind, quality, type_hash or computed_hash)
+        self.topics[name] = topic
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text.encode())
+        metadata = {
+            "offered_qos_profiles": qos_yaml(quality),
+            "topic_type_hash": topic.type_hash,
+        }
+        self._channels[name] = self._writer.register_channel(
+            name, "cdr", self._schemas[kind], metadata
+        )
 
     def write(self, name: str, data: bytes, stamp_ns: int) -> None:
         """Append a CDR message of a topic that was added, logged at `stamp_ns`.
@@ -147,11 +118,8 @@ class BagWriter:
             )
         topic = self.topics[name]
         with self._writing():
-            if self._is_full(stamp_ns):
-                self._close_file()
-                self._open_file()
             self._writer.add_message(
-                self._channel(name),
+                self._channels[name],
                 log_time=stamp_ns,
                 data=data,
                 publish_time=stamp_ns,
@@ -159,19 +127,11 @@ class BagWriter:
             )
             self._stream.flush()  # a full chunk, which the writer has just written
         self._file.add(stamp_ns)
-        self._bytes += len(data)
         topic.count += 1
-
-    def _is_full(self, stamp_ns: int) -> bool:
-        """Return whether a message with this stamp begins a new file."""
-        if self._split.bytes and self._bytes >= self._split.bytes:
-            return True
-        span_ns = stamp_ns - self._file.start_ns
-        return self._split.seconds > 0.0 and span_ns >= self._split.seconds * 1e9
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Name the current file in errors, after which nothing more is written."""
+        """Name the file in errors, after which nothing more is written."""
         try:
             yield
         except OSError as error:

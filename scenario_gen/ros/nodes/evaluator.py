@@ -29,6 +29,8 @@ from scenario_gen.types import Evaluation, Row, WITH
 Entries = Sequence[tuple[bytes, ScenarioEntry]]
 """Scenarios with their entries in `scenarios/info`."""
 SCENARIOS = ("scenarios", INFO)
+MAX_STORED_COUNT = 3000  # scenarios of requests that are not complete
+MAX_REQUEST_COUNT = 100  # of those requests
 QUIET_S = 5.0  # without messages, after which a closed request's missing ones are reported
 
 
@@ -42,15 +44,6 @@ class Config(Parameters):
         "scenarios of a request that are measured; of more the seed chooses these",
         low=1,
         high=1000,
-    )
-    keep: int = parameter(
-        3000,
-        "scenarios stored for incomplete requests; the oldest requests are dropped",
-        low=1,
-        fixed=True,
-    )
-    wait: int = parameter(
-        100, "closed requests that wait for missing scenarios; older ones are dropped", low=1
     )
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
@@ -71,7 +64,7 @@ class Evaluator(StageNode):
 
     def started(self) -> None:
         """Subscribe to scenarios with a quality for which paced publishers wait."""
-        self._requests = RequestTracker(self.config.keep)
+        self._requests = RequestTracker(MAX_STORED_COUNT)
         for topic in SCENARIOS:
             self.listen(topic, LOSSLESS)
 
@@ -98,27 +91,16 @@ class Evaluator(StageNode):
             request.store(entry, b"".join(messages), self.config.seed, self.config.measured)
 
     def _drop_excess(self) -> None:
-        """Drop the oldest requests above the limits of closed requests and of stored scenarios."""
+        """Drop the oldest requests above the limits of requests and of stored scenarios."""
         requests = self._requests.open
-        closed = [name for name, request in requests.items() if request.summary]
-        for name in closed[: max(0, len(closed) - self.config.wait)]:
-            self._drop(name)
-        while len(requests) > 1:
-            stored = sum(len(request.stored) for request in requests.values())
-            if stored <= self.config.keep:
-                break
-            self._drop(next(iter(requests)))
-
-    def _drop(self, request: str) -> None:
-        """Drop a request, and report its missing messages."""
-        message = self._requests.open[request].sentence()
-        self._requests.forget(request)
-        self.status(
-            Level.WARN,
-            f"{message}; it is not evaluated; see keep and wait",
-            "requests",
-            request=request,
-        )
+        while len(requests) > 1 and (
+            len(requests) > MAX_REQUEST_COUNT
+            or sum(len(each.stored) for each in requests.values()) > MAX_STORED_COUNT
+        ):
+            oldest = next(iter(requests))
+            message = f"{requests[oldest].sentence()}; it is not evaluated"
+            self._requests.forget(oldest)
+            self.status(Level.WARN, message, "requests", request=oldest)
 
     def _report_missing(self) -> None:
         """Report the missing messages of closed requests, once no more arrive."""

@@ -25,7 +25,7 @@ from rclpy.time import Time
 
 from msg_conventions.diagnostics import Level, Subject
 from scenario_gen.bags.recordings.message_loss import MessageLoss, TopicLoss
-from scenario_gen.bags.storage.writer import BagWriter, Split
+from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
@@ -60,12 +60,6 @@ class Config(Parameters):
         fixed=True,
     )
     compress: bool = parameter(True, "compress chunks with zstd")
-    split_bytes: int = parameter(
-        0, "size of the messages after which a new file begins; 0: never", unit="B", low=0
-    )
-    split_seconds: float = parameter(
-        0.0, "time after which a new file begins; 0: never", unit="s", low=0.0
-    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -116,13 +110,8 @@ class Recorder(Node):  # type: ignore[misc]
             self._report(Level.OK, "nothing is being recorded; ~/start begins a bag")
 
     def _start(self, folder: Path) -> None:
-        config = self.parameters.config
         with _disk_errors("; name another folder for the bag"):
-            self._bag = BagWriter(
-                folder,
-                compress=config.compress,
-                split=Split(config.split_bytes, config.split_seconds),
-            )
+            self._bag = BagWriter(folder, compress=self.parameters.config.compress)
         self._losses, self._warned = MessageLoss(self.count_publishers), {}
         waits = "" if self._has_time() else "; it begins with the first message on /clock"
         self._report(Level.OK, f"recording to {folder}{waits}")

@@ -23,7 +23,7 @@ from msg_conventions.scenarios import messages_of
 from scenario_gen.bags.recordings.read import load, read_recording, read_scenario_set
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import bag_topics, bag_warnings, read_messages
-from scenario_gen.bags.storage.writer import BagWriter, Split
+from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.types.generation import GenerationResult
@@ -144,23 +144,6 @@ def test_nothing_is_half_written(run, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="file"):
         write_recording(tmp_path / "file" / "bag", run)
-
-
-def test_splitting_by_size_and_by_time(tmp_path):
-    with BagWriter(tmp_path / "bag", split=Split(seconds=1.0), compress=False) as bag:
-        bag.add_topic("/t", "std_msgs/msg/String")
-        for k in range(35):
-            bag.write("/t", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", k * 100_000_000)
-    assert len(bag.files) == 4
-    assert [m.stamp_ns for m in read_messages(tmp_path / "bag")] == [
-        k * 100_000_000 for k in range(35)
-    ]
-    with BagWriter(tmp_path / "size", split=Split(bytes=100)) as bag:
-        bag.add_topic("/t", "std_msgs/msg/String")
-        for k in range(35):
-            bag.write("/t", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", k)
-    assert [file.count for file in bag.files] == [10, 10, 10, 5]
-    assert bag_topics(tmp_path / "size")[0].count == 35
 
 
 KILLED = """
