@@ -18,7 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from msg_conventions.poses import decode_odometry, encode_odometry
+from msg_conventions.poses import encode_odometry
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.types import EgoSlot, token
@@ -35,16 +35,6 @@ def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: in
     if not np.isfinite(state).all():
         raise InputError("a state with a value that is not finite cannot be sent")
     return encode_odometry(state, 0.0, child_frame_id, frame_id, stamp_ns)
-
-
-def decode_state(data: bytes, source: str = "state") -> tuple[int, str, str, Floats]:
-    """Return stamp [ns], frame, child frame and the state (4,).
-
-    Raises:
-        InputError: the message is damaged, or a value is not finite.
-    """
-    stamp_ns, frame_id, child, state = decode_odometry(data, source, framed=True)
-    return stamp_ns, frame_id, child, state[:4]
 
 
 def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[str, bytes]]:

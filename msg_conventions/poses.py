@@ -149,15 +149,3 @@ def encode_frames(poses: Floats, children: Sequence[str], parent: str, stamp_ns:
     return encode(
         TRANSFORMS, transforms=[header | {"child": child, "pose": row} for row, child in rows]
     )
-
-
-def decode_frames(data: bytes, source: str = "tf") -> list[tuple[int, str, str, Floats]]:
-    """Return stamp [ns], parent, child and planar pose (3,) of each transform.
-
-    Raises:
-        InputError: the message is damaged, or a pose is none.
-    """
-    return [
-        (each.stamp, each.frame_id, each.child, poses_of(each.pose[None], source)[0])
-        for each in decode(TRANSFORMS, data, source).transforms
-    ]

@@ -34,8 +34,6 @@ Advance = Callable[[str, int, int], None]
 Progress = Callable[[], AbstractContextManager[Advance]]
 Notify = Callable[[str], None]
 EGO_AUTO = "auto"  # value of --ego: the vehicle that has to react
-SEGMENTATION_S = 0.0007  # the least time for a vehicle's sample: 64 vehicles x 60 s take 27 s
-LONG_RUN_S = 20.0  # a longer run is announced
 MAX_LOG_NOTES_COUNT = 5  # on the terminal; the report has all
 
 
@@ -258,12 +256,6 @@ def generate_all(
     """
     cases: list[GenerationResult] = []
     refusals: list[str] = []
-    n_samples = sum(encounter.is_present.sum() for encounter, _ in pairs)
-    if n_samples * SEGMENTATION_S > LONG_RUN_S:
-        notify(
-            f"{len(pairs)} encounters on roads take {n_samples * SEGMENTATION_S / 60.0:.1f} min or"
-            " more; --encounter NAME chooses some, log.max_vehicles makes them smaller"
-        )
     for encounter, road in pairs:
         name = f"{encounter.name} on {Path(road).stem}"
         advance(name, 0, requested.count)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 import json
+import os
 import re
 import signal
 import subprocess

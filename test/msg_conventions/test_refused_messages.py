@@ -5,9 +5,10 @@
 
 import numpy as np
 import pytest
+from support.message_decoders import decode_state
 
 from msg_conventions import trajectory
-from msg_conventions.ego import decode_state, encode_state
+from msg_conventions.ego import encode_state
 from msg_conventions.paths import decode_path, decode_route, encode_path
 from msg_conventions.roads import decode_map, decode_poses, encode_map, encode_poses
 from msg_conventions.scenarios import decode_scenario

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from support.message_decoders import decode_state
 from support.message_examples import (
     assert_same,
     encounter,
@@ -357,7 +358,7 @@ def test_states(seed):
     sent = np.array(
         [*generator(seed).normal(0, 100, 2), generator(seed).choice(NASTY_HEADINGS), 8.5]
     )
-    stamp, frame, child, got = ego.decode_state(ego.encode_state(sent, "vehicle_7", "map", 5))
+    stamp, frame, child, got = decode_state(ego.encode_state(sent, "vehicle_7", "map", 5))
     assert (stamp, frame, child) == (5, "map", "vehicle_7")
     assert got[[0, 1, 3]].tobytes() == sent[[0, 1, 3]].tobytes()
     assert canonical_angle(got[2]) == canonical_angle(sent[2])

@@ -149,7 +149,7 @@ def test_status_storm_is_bounded(reporter: Reporter):
     )
 
 
-def test_a_message_is_bounded_and_statuses_have_families(reporter: Reporter):
+def test_statuses_have_bounds_and_families(reporter: Reporter):
     reporter.diagnostics.status(Level.WARN, "\x1b" * 10_000, "x", {}, log=False)
     reporter.until(lambda: "x" in reporter.newest(), "the status")
     message = reporter.newest()["x"].message

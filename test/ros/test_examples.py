@@ -12,10 +12,10 @@ import sys
 import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
+from support.message_decoders import decode_frames
 from support.skips import NO_COMPILER
 
 from msg_conventions.autoware import OBJECTS
-from msg_conventions.poses import decode_frames
 from msg_conventions.roads import decode_map
 from scenario_gen.bags.recordings.scenario_decoder import TOPICS
 from scenario_gen.bags.recordings.write import result_messages

@@ -5,8 +5,9 @@
 
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
+from support.message_decoders import decode_frames
 
-from msg_conventions.poses import decode_frames, encode_frames, TYPE
+from msg_conventions.poses import encode_frames, FRAMES_TYPE
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -14,7 +15,9 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 def test_frames_equal_those_of_rosbags():
     poses = np.array([[1.5, -2.25, 0.5], [3.0, 4.0, -3.0]])
     data = encode_frames(poses, ["vehicle_1", "vehicle_long_2"], "map", 17)
-    assert bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, TYPE), TYPE)) == data
+    assert (
+        bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, FRAMES_TYPE), FRAMES_TYPE)) == data
+    )
     found = decode_frames(data)
     assert [one[:3] for one in found] == [(17, "map", "vehicle_1"), (17, "map", "vehicle_long_2")]
     assert np.allclose([one[3] for one in found], poses, rtol=0.0, atol=1e-12)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
+from support.message_decoders import decode_frames
 
-from msg_conventions.poses import decode_frames
 from scenario_gen.bags.recordings.write import result_messages
 
 TOPICS = ("scenarios", "scenarios/info")

@@ -7,9 +7,10 @@ import re
 
 import pytest
 from support.bag_examples import skipped
+from support.message_decoders import decode_state
 from support.suite_processes import Processes, RESOURCES
 
-from msg_conventions.ego import decode_state, ego_messages
+from msg_conventions.ego import ego_messages
 from msg_conventions.scenario_info import RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.bags.recordings.read import load, read_recording

@@ -13,15 +13,15 @@ import sys
 import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
+from support.message_decoders import decode_frames, decode_state
 from support.suite_processes import Client
 
 from msg_conventions.cdr import encode
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.driving import encode_twist
-from msg_conventions.ego import decode_state
 from msg_conventions.layouts import VELOCITY_STAMPED
 from msg_conventions.paths import encode_path
-from msg_conventions.poses import decode_frames, decode_odometry, encode_odometry
+from msg_conventions.poses import decode_odometry, encode_odometry
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, request_summary
 from scenario_gen.bags.recordings.write import result_messages, write_recording

@@ -3,7 +3,7 @@
 
 """Any bag (MCAP, SQLite, ROS 1) of one or several files as raw messages (CDR) by their stamps."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass, replace
 import heapq
@@ -144,11 +144,11 @@ def open_bag(
         raise InputError(
             f"{path} {problem}; name a folder with .mcap, .db3 or .bag files, or one of the files"
         )
-    size = sum(file.stat().st_size for file in bag_files.files)
-    budget = ReadBudget(config, str(path), size, parameter)
+    budget = ReadBudget(config, str(path), parameter)
     with ExitStack() as stack:
+        if bag_files.compression == "file":
+            _check_declared_sizes(bag_files.files, budget)
         if bag_files.compression:
-            _check_declared_sizes(bag_files, budget)
             opened = [path if path.is_dir() else path.parent]
         else:
             opened = [*bag_files.files]
@@ -160,18 +160,21 @@ def open_bag(
         yield bag
 
 
-def _check_declared_sizes(bag_files: BagFiles, budget: ReadBudget) -> None:
-    """Count the decompressed sizes that compressed files declare.
+def _check_declared_sizes(files: Iterable[Path], budget: ReadBudget) -> None:
+    """Check the decompressed sizes that compressed files declare.
 
     Raises:
-        InputError: a file is not compressed, or they exceed the bounds.
+        InputError: a file is not compressed, or one of them exceeds the bound.
     """
-    for file in bag_files.files:
-        if bag_files.compression == "file":
-            with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
-                with file.open("rb") as stream:
-                    head = stream.read(_FRAME_HEADER_BYTES)
-                budget.spend_decompressed(max(0, zstandard.frame_content_size(head)))
+    for file in files:
+        with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
+            with file.open("rb") as stream:
+                size = zstandard.frame_content_size(stream.read(_FRAME_HEADER_BYTES))
+            if size > budget.config.most_bytes:
+                raise InputError(
+                    f"{file}: decompresses to {size} bytes; {budget.parameter} is "
+                    f"{budget.config.most_bytes}"
+                )
 
 
 def _open(path: Path, budget: ReadBudget, stack: ExitStack) -> StoredFile:

@@ -9,8 +9,6 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
 _MESSAGE_COST_BYTES = 256
-_MAX_GROWTH_RATIO = 100
-"""Growth by decompression above which a file is suspicious; maps grow most, 10 to 50 times."""
 
 
 @dataclass(frozen=True)
@@ -34,36 +32,18 @@ class BagConfig(Parameters):
 class ReadBudget:
     """Counts the bytes that reading one bag costs, and refuses to exceed the bounds."""
 
-    def __init__(
-        self, config: BagConfig, bag: str, file_bytes: int, parameter: str = "bag.most_bytes"
-    ) -> None:
+    def __init__(self, config: BagConfig, bag: str, parameter: str = "bag.most_bytes") -> None:
         """Begin with nothing spent.
 
         Args:
             config: the bounds.
             bag: its name in messages.
-            file_bytes: size of its files; they may decompress to 100 times that, or `most_bytes`.
             parameter: name of the parameter that sets `most_bytes`, for messages.
         """
         self.config = config
         self._bag = bag
-        self._parameter = parameter
-        self._decompressed_left = max(config.most_bytes, _MAX_GROWTH_RATIO * file_bytes)
+        self.parameter = parameter
         self._messages_left = config.most_bytes
-
-    def spend_decompressed(self, count: int) -> None:
-        """Count bytes that were decompressed or skipped.
-
-        Raises:
-            InputError: the bag decompresses to more than its size makes plausible.
-        """
-        self._decompressed_left -= count
-        if self._decompressed_left < 0:
-            raise InputError(
-                f"{self._bag}: decompresses to more than {_MAX_GROWTH_RATIO} times its size and "
-                f"more than {self._parameter} ({self.config.most_bytes} bytes), which is unusual "
-                f"for a recording; raise {self._parameter} if the file is sound"
-            )
 
     def spend_message(self, count: int) -> None:
         """Count a message of so many bytes that is passed on.
@@ -74,7 +54,7 @@ class ReadBudget:
         self._messages_left -= count + _MESSAGE_COST_BYTES
         if self._messages_left < 0:
             raise InputError(
-                f"{self._bag}: its messages take more than {self._parameter} "
-                f"({self.config.most_bytes} bytes); raise {self._parameter} if there is enough "
+                f"{self._bag}: its messages take more than {self.parameter} "
+                f"({self.config.most_bytes} bytes); raise {self.parameter} if there is enough "
                 "memory, or read fewer topics"
             )

@@ -140,14 +140,13 @@ class McapFile:
         """Check the size that a chunk declares.
 
         Raises:
-            InputError: it, or that of all, is above the bounds.
+            InputError: it is above the bound.
         """
         max_bytes = self._budget.config.most_chunk_bytes
         if size > max_bytes:
             raise InputError(
                 f"{self._path}: a chunk of {size} bytes; bag.most_chunk_bytes is {max_bytes}"
             )
-        self._budget.spend_decompressed(size)
 
     def _topics(
         self,

@@ -128,4 +128,3 @@ def _check_chunks(path: Path, chunks: Collection[Any], budget: ReadBudget) -> No
                     f"{path}: the chunk at byte {chunk.datapos} exceeds bag.most_chunk_bytes "
                     f"({max_bytes})"
                 )
-            budget.spend_decompressed(len(data))
