@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from benchmarks._feature_matrix import pair_similarities
 from benchmarks._paper_chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
 from benchmarks._reference_sets import (
     UNIFORM,
@@ -20,7 +21,6 @@ from scenario_gen.method.evaluation import (
     Bootstrap,
     mean_correlation,
     mean_error,
-    pair_similarities,
 )
 from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig

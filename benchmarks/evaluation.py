@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from benchmarks._feature_matrix import dtw_distance, feature_matrix
 from benchmarks._reference_sets import evaluate_with_references
 from benchmarks._sampling_cases import DATA
 from benchmarks._similarity import error_rows
@@ -25,7 +26,6 @@ from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.method.evaluation import dtw_distance, feature_matrix
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types.encounter import Encounter

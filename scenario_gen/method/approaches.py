@@ -118,7 +118,8 @@ def approaches(pair: InteractingPair) -> tuple[Approach, Approach]:
     after = int(first.time[-1] / first.track.dt) + 1
     consecutive = two_drives(first, second, after)
     areas = conflict_of(consecutive, 0, 1)
-    narrower = conflict_of(_narrower(consecutive), 0, 1)
+    narrow = tuple(replace(each, width=0.5 * each.width) for each in consecutive.vehicles)
+    narrower = conflict_of(replace(consecutive, vehicles=narrow), 0, 1)
     if areas is None or narrower is None or areas.first != 0:
         raise RefusedError("the vehicles hardly touch each other's paths")
     begins = after * first.track.dt
@@ -162,12 +163,6 @@ def offered_lag_of(first: Approach, second: Approach) -> float:
     counts = is_near & comes if comes.any() else np.tile(time >= 0.0, (2, 1))
     k = int(np.argmax(counts.any(axis=0)))
     return float(arrivals[0, k] - arrivals[1, k])
-
-
-def _narrower(encounter: Encounter) -> Encounter:
-    """Return an encounter with vehicles of half their widths."""
-    vehicles = tuple(replace(each, width=0.5 * each.width) for each in encounter.vehicles)
-    return replace(encounter, vehicles=vehicles)
 
 
 def two_drives(first: Drive, second: Drive, begin: int) -> Encounter:

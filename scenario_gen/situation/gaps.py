@@ -52,11 +52,6 @@ def departure(motion: Motion, n: int, entry: float) -> float:
     return float(time[k] + share * (time[k + 1] - time[k]))
 
 
-def lag_behind(motion: Motion, conflict: Conflict) -> float:
-    """Return the time [s] from the exit of the first vehicle to the departure of the second."""
-    return departure(motion, conflict.second, conflict.entry_second) - conflict.exit_first
-
-
 def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float, float]:
     """Return when [s] the first vehicle clears the conflict area, and when the second one enters.
 

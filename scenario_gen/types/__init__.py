@@ -73,13 +73,11 @@ from scenario_gen.types.lanes import (
 )
 from scenario_gen.types.motion import (
     ALWAYS,
-    always,
     at_ends,
     canonical_presence,
     cut,
     mask,
     Motion,
-    States,
     together,
 )
 from scenario_gen.types.notes import Note, note_kinds, NoteKind, recorded_notes
@@ -88,7 +86,7 @@ from scenario_gen.types.reaction import (
     Reaction,
     ReactionGraph,
 )
-from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
+from scenario_gen.types.request import ENDS, ORDERS, Request
 from scenario_gen.types.road import MAX_CELL_M, MAX_ORIGIN_M, MIN_CELL_M, Road
 from scenario_gen.types.scenario import (
     BoundaryStates,
@@ -208,8 +206,6 @@ __all__ = [
     "SignalState",
     "SignalStop",
     "Spread",
-    "State",
-    "States",
     "Target",
     "TrafficLight",
     "TrafficRule",
@@ -219,7 +215,6 @@ __all__ = [
     "VehicleType",
     "Verdict",
     "Violation",
-    "always",
     "as_markdown",
     "at_ends",
     "canonical_presence",
@@ -234,7 +229,6 @@ __all__ = [
     "most_exposed",
     "note_kinds",
     "read_numbers",
-    "read_states",
     "rear_axle",
     "recorded_notes",
     "rightwards",

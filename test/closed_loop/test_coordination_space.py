@@ -17,7 +17,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.situation import conflict_of, lag_behind, lane_gaps, Situation, time_gaps
+from scenario_gen.situation import conflict_of, departure, lane_gaps, Situation, time_gaps
 from scenario_gen.types import Facts, join_ego, with_witness
 
 CONFIG = PipelineConfig()
@@ -46,6 +46,11 @@ def generated(encounter, count):
         .run()
         .generated
     )
+
+
+def lag_behind(motion, conflict):
+    """Return the time [s] from the exit of the first vehicle to the departure of the second."""
+    return departure(motion, conflict.second, conflict.entry_second) - conflict.exit_first
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ from scenario_gen.method.evaluation.criticality import (
     criticality,
     distance_and_ttc,
     footprint_distance,
-    time_to_collision,
 )
 from scenario_gen.method.evaluation.distributions import (
     Bootstrap,
@@ -17,14 +16,13 @@ from scenario_gen.method.evaluation.distributions import (
     paired_difference,
     wilson,
 )
-from scenario_gen.method.evaluation.dtw import dtw_distance, feature_matrix, mean_feature
+from scenario_gen.method.evaluation.dtw import mean_feature
 from scenario_gen.method.evaluation.evaluate import (
     evaluate,
     evaluate_scenarios,
     MEASURED_SCENARIOS,
 )
 from scenario_gen.method.evaluation.law import measures_in
-from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.non_reactive import (
     free_acceleration,
@@ -37,7 +35,6 @@ from scenario_gen.method.evaluation.samples import common_motion, replay, Sample
 from scenario_gen.method.evaluation.similarity import (
     mean_correlation,
     mean_error,
-    pair_similarities,
 )
 from scenario_gen.method.evaluation.time_shift import min_time_shift
 
@@ -45,7 +42,6 @@ __all__ = [
     "MAX_ACCELERATION_MPS2",
     "MAX_BRAKING_MPS2",
     "MEASURED_SCENARIOS",
-    "MEASURES",
     "STANDSTILL_MPS",
     "Bootstrap",
     "EvaluationConfig",
@@ -57,10 +53,8 @@ __all__ = [
     "coverage_of",
     "criticality",
     "distance_and_ttc",
-    "dtw_distance",
     "evaluate",
     "evaluate_scenarios",
-    "feature_matrix",
     "footprint_distance",
     "free_acceleration",
     "mean_correlation",
@@ -68,10 +62,8 @@ __all__ = [
     "mean_feature",
     "measures_in",
     "min_time_shift",
-    "pair_similarities",
     "paired_difference",
     "replay",
-    "time_to_collision",
     "wanted_speeds",
     "wilson",
 ]

@@ -23,14 +23,6 @@ def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
     return distance_and_ttc(motion, a, b)[0]
 
 
-def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
-    """Return the time (T,) [s] until footprints a and b touch at constant velocity, or inf.
-
-    Source: Hayward 1972.
-    """
-    return distance_and_ttc(motion, a, b)[1]
-
-
 def distance_and_ttc(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
     """Return the distance [m] of two footprints and the time to collision [s], (T,) each."""
     distance, time = np.empty_like(motion.time), np.empty_like(motion.time)

@@ -243,7 +243,8 @@ class Law:
     @classmethod
     def of(cls, kind: EncounterKind, seen: Sequence[Floats]) -> "Law":
         """Learn the law of a kind from features (F,) of encounters and the shipped law."""
-        mean, covariance = _shipped_law(kind)
+        laws = _shipped()
+        mean, covariance = laws.get(kind) or laws[EncounterKind.CROSSING]
         n = len(seen)
         rows = np.array(seen).reshape(n, len(mean))
         mean = (MEAN_PRIOR_WEIGHT * mean + rows.sum(axis=0)) / (MEAN_PRIOR_WEIGHT + n)
@@ -316,12 +317,6 @@ def measures_in(
 
 def _is_same(member: EncounterFeatures, other: EncounterFeatures) -> bool:
     return member.kind == other.kind and np.allclose(member.features, other.features)
-
-
-def _shipped_law(kind: EncounterKind) -> tuple[Floats, Floats]:
-    """Return mean (F,) and covariance (F, F) of a kind; by default those of crossings."""
-    laws = _shipped()
-    return laws[kind if kind in laws else EncounterKind.CROSSING]
 
 
 @cache

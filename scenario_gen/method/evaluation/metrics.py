@@ -39,10 +39,6 @@ HEADINGS = (_SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY)
 Estimates = dict[str, Interval]
 
 
-def _nothing(_: Template) -> Mapping[str, float]:
-    return {}
-
-
 @dataclass(frozen=True)
 class MetricGroup:
     """Metrics that are computed together.
@@ -56,7 +52,7 @@ class MetricGroup:
 
     metrics: tuple[Metric, ...]
     measure: Callable[[Samples], Mapping[str, Interval]]
-    of_template: Callable[[Template], Mapping[str, float]] = _nothing
+    of_template: Callable[[Template], Mapping[str, float]] = lambda _: {}
 
 
 def rates(samples: Samples) -> Estimates:

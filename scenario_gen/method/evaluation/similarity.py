@@ -11,7 +11,6 @@ sums, which makes G a quarter as large where they come in pairs.
 """
 
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -113,17 +112,6 @@ def pair_similarity(
         first += float(target.sum())
         second += float(np.square(target).sum())
     return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
-
-
-def pair_similarities(
-    template: Floats, generated: Floats, distance: Distance, least: float = 0.0
-) -> list[PairSimilarity]:
-    """Compare all pairs: template (N, T, D) and generated (S, N, T, D), see `pair_similarity`."""
-    target, series = np.moveaxis(template, -1, -2), np.moveaxis(generated, -1, -2)
-    return [
-        pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance, least)
-        for a, b in combinations(range(template.shape[0]), 2)
-    ]
 
 
 def mean_error(pairs: list[PairSimilarity], weights: Floats) -> Floats:

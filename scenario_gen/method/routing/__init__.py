@@ -10,7 +10,6 @@ from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
     Plan,
-    Planner,
     PoseQuery,
     Preferences,
 )
@@ -20,7 +19,6 @@ __all__ = [
     "BudgetSpentError",
     "MakePlanner",
     "Plan",
-    "Planner",
     "PlanningConfig",
     "PoseQuery",
     "Preferences",

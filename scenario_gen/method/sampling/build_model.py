@@ -163,7 +163,7 @@ def _nominal_clock(
     plain = clock_from_rate(grid, np.ones(len(grid)))
     slowdowns = []
     for vehicle in routed:
-        mean = vehicle.without_bends.mean(plain)
+        mean = vehicle.without_limit("max_lateral_acceleration").mean(plain)
         slowdown = np.ones(len(grid))
         if not isinstance(mean, str):
             slowdown = vehicle.slowdown(mean.coefficients, grid)
@@ -210,18 +210,13 @@ def _feasible_stretch(
         if len(feasible) < len(means):
             failed = means
             continue
-        shift = _largest_shift(routed, feasible)
+        pairs = zip(routed, feasible, strict=True)
+        shift = max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
         if shift < least_shift - _TUNING.free_shift:
             best, least_shift = _Stretch(stretched, feasible, _stretch_notes(stretch), ""), shift
         if shift <= _TUNING.free_shift:
             break
     return best if best.means else best._replace(refusal=_refusal(routed, failed, clock))
-
-
-def _largest_shift(routed: Sequence[RoutedVehicle], means: Sequence[MeanSpeed]) -> float:
-    """Return the largest distance [m] of any vehicle from a changepoint when it is due."""
-    pairs = zip(routed, means, strict=True)
-    return max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
 
 
 def _stretch_notes(stretch: float) -> list[Note]:
@@ -279,7 +274,7 @@ def _vehicle_model(
         routed.recorded_time,
         routed.recorded_speed,
         config.of(routed.vehicle.kind).longitudinal_sigma,
-        min(config.longitudinal_time, _TUNING.length_share * routed.present_time),
+        min(config.longitudinal_time, _TUNING.length_share * float(np.ptp(routed.times))),
     )
     root = lateral_covariance_root(path, room, config, routed.steering)
     return _NotedVehicle(VehicleModel(routed.vehicle, path, root, room, speed), notes)

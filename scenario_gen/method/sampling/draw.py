@@ -235,7 +235,9 @@ class _Run:
         self.sampler = search.sampler
         if search.evaluations.hits:
             judged = self._directed(search.pilot)
-            while not self._is_done(budget) and not self._is_hopeless():
+            while self.candidates < budget and not self._is_complete():
+                if not self.scenarios and self.candidates >= _HOPELESS_CANDIDATES:
+                    break
                 self._consume(judged, min(BLOCK_CANDIDATES, budget - self.candidates))
         reached = None
         if self.candidates:
@@ -291,12 +293,6 @@ class _Run:
 
     def _is_complete(self) -> bool:
         return len(self.scenarios) >= self.count or self.callbacks.cancelled()
-
-    def _is_done(self, budget: int) -> bool:
-        return self.candidates >= budget or self._is_complete()
-
-    def _is_hopeless(self) -> bool:
-        return not self.scenarios and self.candidates >= _HOPELESS_CANDIDATES
 
     def _note_level(self, best: int, tried: int) -> None:
         """Note which of the tried levels is used."""

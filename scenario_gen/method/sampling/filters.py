@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.importance_sampling import TargetSet
 from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS, Sampler
 from scenario_gen.method.sampling.time_warp import MIN_RATE_RATIO, SAMPLE_PERIOD_S
@@ -131,15 +132,10 @@ class ValidityFilter:
                 if verdict.not_applicable <= absent:
                     also_lost = _lost_reactions(verdict)
                     lost = {pair: lost[pair] for pair in lost if pair in also_lost}
-        vehicles, nominal = sampler.model.vehicles, sampler.model.warp.nominal
+        vehicles = sampler.model.vehicles
         distances = np.array([_MIN_DISTANCE_SHARE * vehicle.path.length for vehicle in vehicles])
-        duration = min(MIN_DURATION_S, MIN_RATE_RATIO * float(nominal.time[-1]))
-        braking = _HARDER_MPS2 + _strongest_braking(undisturbed, math.inf)
-        braking = np.maximum(braking, _COMFORTABLE_MPS2)
-        end = float(nominal.grid[-1]) - _ENDING_S
-        for edge in sampler.model.reactions.edges:
-            if edge.kind == FOLLOW and edge.until > end:
-                braking[edge.who] = math.inf
+        duration = min(MIN_DURATION_S, MIN_RATE_RATIO * float(sampler.model.warp.nominal.time[-1]))
+        braking = _allowed_end_braking(sampler.model, undisturbed)
         return cls(check, absent, enough, lost, distances, duration, braking)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
@@ -209,6 +205,17 @@ class ValidityFilter:
             further = range(count, _LARGE_PILOT_FACTOR * count)
             best.candidates.extend(self.judged(sampler.block(best.level, k) for k in further))
         return best
+
+
+def _allowed_end_braking(model: CandidateModel, undisturbed: Scenario) -> Floats:
+    """Return how hard (N,) [m/s²] each vehicle may brake at its end; inf behind a leader."""
+    braking = _HARDER_MPS2 + _strongest_braking(undisturbed, math.inf)
+    braking = np.maximum(braking, _COMFORTABLE_MPS2)
+    end = float(model.warp.nominal.grid[-1]) - _ENDING_S
+    for edge in model.reactions.edges:
+        if edge.kind == FOLLOW and edge.until > end:
+            braking[edge.who] = math.inf
+    return braking
 
 
 def _strongest_braking(scenario: Scenario, seconds: float) -> Floats:
@@ -295,21 +302,14 @@ class Filters:
     def judged(self, blocks: Iterable[Block]) -> Iterator[Candidate]:
         """Yield the candidates of blocks, each with the cause for which it is refused."""
         for block in blocks:
-            in_range = [each is not None and self._in_range(each) for each in block.scenarios]
-            reaching = Block(
-                block.indices,
-                [
-                    each if reaches else None
-                    for each, reaches in zip(block.scenarios, in_range, strict=True)
-                ],
-            )
-            for candidate, scenario in zip(
-                self.validity.judged([reaching]), block.scenarios, strict=True
-            ):
-                if candidate.scenario is None and scenario is not None:
-                    yield Candidate(candidate.index, scenario, Cause.OUT_OF_RANGE)
+            pairs = list(zip(*block, strict=True))
+            far = {index for index, each in pairs if each is not None and not self._in_range(each)}
+            near = Block(block.indices, [None if k in far else each for k, each in pairs])
+            for judged, (_, scenario) in zip(self.validity.judged([near]), pairs, strict=True):
+                if judged.index in far:
+                    yield replace(judged, scenario=scenario, cause=Cause.OUT_OF_RANGE)
                 else:
-                    yield self.rejudged(candidate)
+                    yield self.rejudged(judged)
 
     def rejudged(self, candidate: Candidate) -> Candidate:
         """Return a checked candidate; out of range, or rare, with that cause."""

@@ -119,17 +119,8 @@ class RoutedVehicle:
     rests: list[tuple[float, float]]
     limits: Dynamics
 
-    @property
-    def present_time(self) -> float:
-        """Seconds for which it is present in the template."""
-        return float(self.times[-1] - self.times[0])
-
-    @property
-    def without_bends(self) -> "RoutedVehicle":
-        """The vehicle without a lateral limit, which suffices to know where it is when."""
-        return self._without_limit("max_lateral_acceleration")
-
-    def _without_limit(self, name: str) -> "RoutedVehicle":
+    def without_limit(self, name: str) -> "RoutedVehicle":
+        """Return the vehicle without a limit."""
         return replace(self, limits=replace(self.limits, **{name: _NO_LIMIT_RATIO}))
 
     def target(self, clock: Clock) -> Target:
@@ -185,7 +176,7 @@ class RoutedVehicle:
         limiting = [
             f"limits.{self.vehicle.type}.{entry.name}"
             for entry in fields(self.limits)
-            if not isinstance(self._without_limit(entry.name).mean(clock), str)
+            if not isinstance(self.without_limit(entry.name).mean(clock), str)
         ]
         return f" (more of {' or of '.join(limiting)} would do)" if limiting else ""
 

@@ -4,22 +4,18 @@
 """Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
 
 from scenario_gen.method.segmentation.estimator import (
-    CONVERGED_R_HAT_RATIO,
     SegmentationWarning,
     StickyHDPHMM,
 )
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.posterior import Posterior
 from scenario_gen.method.segmentation.segmenter import (
-    DEFAULT,
     segment,
     segment_track,
     SegmentationConfig,
 )
 
 __all__ = [
-    "CONVERGED_R_HAT_RATIO",
-    "DEFAULT",
     "Posterior",
     "SamplerConfig",
     "SegmentationConfig",

@@ -213,7 +213,10 @@ class Checker:
             met: all its conflicts.
             conflicts: those of the template, None for one that it does not have.
         """
-        yield from self._state_faults(scenario)
+        if self.ends is not None and not scenario.all_present:
+            yield from presence_violations(scenario, self.ends)
+        if self.requested is not None:
+            yield from state_violations(scenario, self.requested, self._limits)
         yield from motion_violations(scenario, self._limits)
         yield from self._footprint_faults(scenario)
         yield from self._wrong_ways(scenario)
@@ -255,13 +258,6 @@ class Checker:
                     f"{counts}, but the recording's waits, conflicts and reactions "
                     f"name vehicle {i}"
                 )
-
-    def _state_faults(self, scenario: Scenario) -> Iterator[Violation]:
-        """Yield presences and boundary states that are not as requested."""
-        if self.ends is not None and not scenario.all_present:
-            yield from presence_violations(scenario, self.ends)
-        if self.requested is not None:
-            yield from state_violations(scenario, self.requested, self._limits)
 
     def _footprint_faults(self, scenario: Scenario) -> Iterator[Violation]:
         """Yield overlaps, and footprints that leave the road; a trailer is its vehicle's part."""

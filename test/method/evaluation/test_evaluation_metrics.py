@@ -13,11 +13,9 @@ from scipy import stats
 from scipy.spatial.distance import jensenshannon
 from support.evaluation_worlds import CARS, crossing, samples
 
+from benchmarks._feature_matrix import feature_matrix, pair_similarities
 from scenario_gen.method.evaluation import evaluate_scenarios, similarity
-from scenario_gen.method.evaluation.criticality import (
-    footprint_distance,
-    time_to_collision,
-)
+from scenario_gen.method.evaluation.criticality import distance_and_ttc, footprint_distance
 from scenario_gen.method.evaluation.distributions import (
     Bootstrap,
     compare,
@@ -26,7 +24,6 @@ from scenario_gen.method.evaluation.distributions import (
     values_of,
     wilson,
 )
-from scenario_gen.method.evaluation.dtw import feature_matrix
 from scenario_gen.types import Motion, Vehicle
 
 ONCE = np.ones((1, 1))
@@ -40,6 +37,10 @@ def still(xy, yaw, sizes=((4.0, 2.0), (4.0, 2.0)), speed=(0.0, 0.0)):
         np.array(speed, float)[:, None],
     )
     return Motion.sampled(vehicles, 0.1, position, heading, pace)
+
+
+def time_to_collision(motion, a, b):
+    return distance_and_ttc(motion, a, b)[1]
 
 
 def test_time_to_collision_by_hand():
@@ -136,7 +137,7 @@ def test_errors_are_those_of_mean_matrix():
     template = crossing().with_samples(60)
     motions = [scenario.with_samples(60) for scenario in samples(crossing(), 7)]
     position = np.stack([motion.position for motion in motions])
-    pairs = similarity.pair_similarities(template.position, position, "euclidean")
+    pairs = pair_similarities(template.position, position, "euclidean")
     target = feature_matrix(*template.position)
     for weights in (np.ones(7), np.array([3.0, 0, 0, 1, 0, 2, 1])):
         mean = np.average(
@@ -153,7 +154,7 @@ def test_constant_matrix_is_left_out():
     speed = np.stack([np.zeros(9), np.zeros(9), np.linspace(0, 5, 9)])[
         ..., None
     ]  # two stand, one drives off
-    pairs = similarity.pair_similarities(
+    pairs = pair_similarities(
         speed, np.stack([speed * 1.1 + 0.1 * np.linspace(0, 1, 9)[:, None]]), "manhattan"
     )
     errors = [pair.error(ONCE)[0] for pair in pairs]

@@ -15,7 +15,7 @@ from support.reaction_scenes import answering, lane_encounter, wander
 from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
-from scenario_gen.method.evaluation.criticality import time_to_collision
+from scenario_gen.method.evaluation.criticality import distance_and_ttc
 from scenario_gen.method.evaluation.law import (
     FEATURES,
     features_of,
@@ -143,7 +143,7 @@ def test_features_are_those_of_loops(kind, seed):
         closing = closing[[round(conflict.entry_first / dt)]]
         assert values["gap"] == pytest.approx(conflict.entry_second - conflict.exit_first)
         assert values["arrival gap"] == pytest.approx(conflict.entry_second - conflict.entry_first)
-    least = time_to_collision(one, first, second).min()
+    least = distance_and_ttc(one, first, second)[1].min()
     assert values["time to collision"] == pytest.approx(min(least, 10.0))
     assert values["closing speed"] == pytest.approx(closing.max())
     assert values["approach"] == pytest.approx(min(conflict.entry_second, 20.0))

@@ -13,7 +13,7 @@ import pytest
 import shapely
 from support.evaluation_worlds import report_case
 
-from scenario_gen.method.evaluation import feature_matrix
+from benchmarks._feature_matrix import feature_matrix
 from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, road_data
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road

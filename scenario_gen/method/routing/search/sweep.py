@@ -214,13 +214,6 @@ def _sweep_step(a: _Frame, b: _Frame, scene: Scene) -> tuple[bool, float]:
 
 
 @kernel(inline=True)
-def footprint_is_free(pose: Pose, scene: Scene) -> bool:
-    """Whether the footprint at a pose is free."""
-    frame = _frame_of(pose)
-    return bool(_sweep_step(frame, frame, scene)[0])
-
-
-@kernel(inline=True)
 def _offset_from_guide(x: float, y: float, guide: Floats) -> float:
     """Return how far (x, y) lies to the left of a guide (G, 3), at the nearest pose."""
     best, nearest = np.inf, 0
@@ -330,7 +323,8 @@ def edge_cost(start: Pose, end: Pose, edge: Curve, scene: Scene) -> float:
 def is_free(pose: Pose, scene: Scene) -> bool:
     """Whether the body at a pose is free."""
     if scene.body.turn_radius > 0.0:
-        return footprint_is_free(pose, scene)
+        frame = _frame_of(pose)
+        return bool(_sweep_step(frame, frame, scene)[0])
     return segment_free(scene.clearance, pose.x, pose.y, pose.x, pose.y, scene.body.half_length)
 
 
