@@ -115,10 +115,6 @@ class Criticality:
         same = [mine[pair] == first for pair, first in template.order if pair in mine]
         return float(np.mean(same)) if same else math.nan
 
-    def vanished_of(self, template: "Criticality") -> int:
-        """Return the number of the template's conflicts that do not exist here."""
-        return len(dict(template.order).keys() - dict(self.order).keys())
-
 
 def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""

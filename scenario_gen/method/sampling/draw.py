@@ -235,9 +235,7 @@ class _Run:
         self.sampler = search.sampler
         if search.evaluations.hits:
             judged = self._directed(search.pilot)
-            while self.candidates < budget and not self._is_complete():
-                if not self.scenarios and self.candidates >= _HOPELESS_CANDIDATES:
-                    break
+            while not self._is_done(budget):
                 self._consume(judged, min(BLOCK_CANDIDATES, budget - self.candidates))
         reached = None
         if self.candidates:
@@ -293,6 +291,10 @@ class _Run:
 
     def _is_complete(self) -> bool:
         return len(self.scenarios) >= self.count or self.callbacks.cancelled()
+
+    def _is_done(self, budget: int) -> bool:
+        is_hopeless = not self.scenarios and self.candidates >= _HOPELESS_CANDIDATES
+        return self.candidates >= budget or is_hopeless or self._is_complete()
 
     def _note_level(self, best: int, tried: int) -> None:
         """Note which of the tried levels is used."""

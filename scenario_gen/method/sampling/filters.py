@@ -302,14 +302,15 @@ class Filters:
     def judged(self, blocks: Iterable[Block]) -> Iterator[Candidate]:
         """Yield the candidates of blocks, each with the cause for which it is refused."""
         for block in blocks:
-            pairs = list(zip(*block, strict=True))
-            far = {index for index, each in pairs if each is not None and not self._in_range(each)}
-            near = Block(block.indices, [None if k in far else each for k, each in pairs])
-            for judged, (_, scenario) in zip(self.validity.judged([near]), pairs, strict=True):
-                if judged.index in far:
-                    yield replace(judged, scenario=scenario, cause=Cause.OUT_OF_RANGE)
+            near = [
+                each if each is None or self._in_range(each) else None for each in block.scenarios
+            ]
+            judged = self.validity.judged([block._replace(scenarios=near)])
+            for candidate, scenario in zip(judged, block.scenarios, strict=True):
+                if candidate.scenario is scenario:
+                    yield self.rejudged(candidate)
                 else:
-                    yield self.rejudged(judged)
+                    yield replace(candidate, scenario=scenario, cause=Cause.OUT_OF_RANGE)
 
     def rejudged(self, candidate: Candidate) -> Candidate:
         """Return a checked candidate; out of range, or rare, with that cause."""

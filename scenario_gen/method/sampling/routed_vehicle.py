@@ -258,7 +258,10 @@ def route_vehicle(
     rests = _rests(knots, times)
     spline = SpeedSpline.over(float(times[0]), float(times[-1]), rests)
     lines = rounded_lines(spline, knots, time, scale * speed, recorded)
-    track, jerk = plan.situation.tracks[n], _largest_jerk(scale * speed, encounter.dt)
+    track = plan.situation.tracks[n]
+    jerk = float(np.abs(np.diff(scale * speed, 2)).max(initial=0.0)) / (
+        encounter.dt * encounter.dt
+    )
     lateral = _largest_lateral(encounter, track, n)
     bend = config.bend_acceleration or max(_TUNING.bend_factor * lateral, _TUNING.min_bend)
     steering = Steering.of(time, np.unwrap(encounter.heading[n, span]), speed, path.length)
@@ -311,11 +314,6 @@ def sharpest_curvature(path: BasePath) -> Floats:
     reach = 2 * int(np.ceil(_TUNING.curve_reach / path.spacing)) + 1
     smooth = ndimage.uniform_filter1d(np.abs(path.curvature), 3, mode="nearest")
     return np.asarray(ndimage.maximum_filter1d(smooth, reach, mode="nearest"))
-
-
-def _largest_jerk(speed: Floats, dt: float) -> float:
-    """Return the largest second difference of speeds (T,) [m/s] over time [m/s³]."""
-    return float(np.abs(np.diff(speed, 2)).max(initial=0.0)) / (dt * dt)
 
 
 def _largest_lateral(encounter: Encounter, track: Track, n: int) -> float:
