@@ -99,6 +99,11 @@ class Lane:
         return frozen((self.left + self.right) / 2.0)
 
     @cached_property
+    def width(self) -> Floats:
+        """(M,) metres, the width of each cross-section."""
+        return frozen(np.hypot(*(self.left - self.right).T))
+
+    @cached_property
     def middle(self) -> Floats:
         """(M - 1, 2) metres, the middle between each two neighbouring cross-sections."""
         return frozen((self.centre[1:] + self.centre[:-1]) / 2.0)

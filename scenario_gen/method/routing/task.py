@@ -75,8 +75,8 @@ def too_narrow(task: VehicleTask) -> str:
     fits = footprint_fits(task.road, poses, vehicle.length, vehicle.width)
     outside = poses[~fits & (curvature < STRAIGHT_PER_M)]
     for lane in network.lanes if network is not None and len(outside) else ():
-        distance = cdist(outside[:, :2], (lane.left + lane.right) / 2.0)
-        width = np.hypot(*(lane.left - lane.right).T)[distance.argmin(axis=1)]
+        distance = cdist(outside[:, :2], lane.centre)
+        width = lane.width[distance.argmin(axis=1)]
         on_lane = distance.min(axis=1) < width / 2.0
         narrow = np.flatnonzero(on_lane & (width < vehicle.width - 0.3))
         if len(narrow):

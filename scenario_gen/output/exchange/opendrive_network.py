@@ -16,7 +16,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import edge_lengths, unit_left
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.types import Lane, LaneNetwork
+from scenario_gen.types import LaneNetwork
 
 FIRST_ROAD_ID = 1  # also in the template
 FIRST_JUNCTION_ID = 1000
@@ -86,7 +86,7 @@ class Strip:
         across = first.left - first.right
         yaw = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
         widths = [
-            np.stack([_width(lanes[k]) for k in side]) if side else np.zeros((0, len(yaw)))
+            np.stack([lanes[k].width for k in side]) if side else np.zeros((0, len(yaw)))
             for side in (along, against)
         ]
         reference = np.column_stack((first.left if right else first.right, yaw))
@@ -96,10 +96,6 @@ class Strip:
             np.zeros(len(yaw)),
             dict(zip(order, (widths[0], widths[1][:, ::-1]), strict=True)),
         )
-
-
-def _width(lane: Lane) -> Floats:
-    return np.asarray(np.hypot(*(lane.left - lane.right).T))
 
 
 def connecting(network: LaneNetwork) -> dict[int, str]:

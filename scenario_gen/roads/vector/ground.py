@@ -114,11 +114,10 @@ def _in_bounding_box(lane: Lane, poses: Floats) -> Bools:
 
 def _lies_along(lane: Lane, poses: Floats) -> Bools:
     """Return whether poses (M, 3) in a lane's bounding box lie in the lane, in its direction."""
-    half_width = np.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
     distance = cdist(poses[:, :2], lane.middle)
     nearest = distance.argmin(axis=1)
     turn = np.abs(wrap_angle(lane.yaw[nearest] - poses[:, 2]))
-    inside = distance.min(axis=1) <= half_width[nearest]
+    inside = distance.min(axis=1) <= lane.width[nearest] / 2.0
     return np.asarray(inside & (turn < _MAX_TURN_FROM_LANE_RAD))
 
 
