@@ -63,7 +63,6 @@ from scenario_gen.situation.tracks import (
     sharpness_of,
     Track,
     turn_of,
-    turns_to_keep,
 )
 from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
@@ -130,5 +129,4 @@ __all__ = [
     "track_conflicts",
     "traffic_side",
     "turn_of",
-    "turns_to_keep",
 ]  # fmt: skip

@@ -28,7 +28,6 @@ from scenario_gen.situation.tracks import (
     is_same_turn,
     Track,
     turn_of,
-    turns_to_keep,
 )
 from scenario_gen.types import Loss
 
@@ -89,9 +88,8 @@ def find_losses(tracks: Tracks, placed: Tracks) -> tuple[Loss, ...]:
 def _lost_turns(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for track, placed_track in zip(tracks, placed, strict=True):
         turn, name = turn_of(placed_track), track.vehicle.id
-        lost = next((each for each in turns_to_keep(track) if not is_same_turn(each, turn)), None)
-        if lost is not None:
-            recorded, placed_turn = describe_turn(lost), describe_turn(turn)
+        if not is_same_turn(turn_of(track), turn):
+            recorded, placed_turn = describe_turn(turn_of(track)), describe_turn(turn)
             message = f"vehicle {name} {recorded} in the recording, {placed_turn} on this road"
             is_bend = follows_bend(track) and follows_bend(placed_track)
             yield Loss("bend" if is_bend else "turn", (name,), message)

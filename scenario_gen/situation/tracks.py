@@ -61,7 +61,6 @@ class Track:
         still: whether it always stands.
         deviation: largest distance [m] from a recorded position to the cleaned one.
         present: (2,) first and last sample; before and after, progress and speed are constant.
-        recorded_turn: how far [rad, left positive] the recorded heading turns; NaN if it stands.
         dt: seconds between samples.
         lane: the centre line of its lanes on a road, beyond both ends of its path; None: unknown.
     """
@@ -73,7 +72,6 @@ class Track:
     still: bool
     deviation: float
     present: Ints
-    recorded_turn: float
     dt: float
     lane: Curve | None = None
 
@@ -177,7 +175,6 @@ def _clean(encounter: Encounter, n: int) -> Track:
         still=still,
         deviation=path.deviation,
         present=frozen_ints([first, last]),
-        recorded_turn=math.nan if still else float(record.heading[-1] - record.heading[0]),
         dt=encounter.dt,
     )
 
@@ -302,15 +299,6 @@ def follows_bend(track: Track) -> bool:
     """Whether a track turns no more than a road bends: at most 25° within 30 m."""
     share = min(track.travelled / TURN_WINDOW_M, 1.0)
     return abs(track.turning(TURN_WINDOW_M)) <= share * MAX_BEND_RAD
-
-
-def turns_to_keep(track: Track) -> list[float]:
-    """How far [rad] a track turns: by its path, and by its recorded heading unless they disagree.
-
-    A path is smoothed, and turns less at its ends than the vehicle did.
-    """
-    turn, recorded = turn_of(track), track.recorded_turn
-    return [turn, recorded] if is_same_turn(recorded, turn) else [turn]
 
 
 def sharpness_of(track: Track) -> float:

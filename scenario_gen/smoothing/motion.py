@@ -124,11 +124,11 @@ class Motion:
         linear = np.zeros(self.size + 3)
         start, third = self._differences(3)
         weight = np.full(len(start), self.dt / (self.jerk * self.dt**3) ** 2)
-        observe(quadratic, linear, start, third, 1, weight, np.zeros(len(weight)))
+        observe(quadratic, linear, start, third, weight)
         for seconds, values, deviation, are_speeds in observed:
             tick, weights = self._weights(seconds, speed=are_speeds)
             start, rows = self._merged(tick, np.column_stack(weights))
-            observe(quadratic, linear, start, rows, 1, 1.0 / np.square(deviation), values)
+            observe(quadratic, linear, start, rows, 1.0 / np.square(deviation), values)
         best = self._optimum(quadratic[:, : self.size], linear[: self.size])
         # Within the solver's tolerance, the motion may run backwards.
         increasing = np.maximum.accumulate(best)

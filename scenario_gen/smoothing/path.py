@@ -160,24 +160,12 @@ def fit_path(
     spacing = np.abs(np.gradient(place)) if len(place) > 1 else np.ones(1)
     weight = weight * np.clip(spacing / _PATH.creep_m, 0.005, 1.0) / np.square(noise)
     count = spans + 3
-    band = np.zeros((8, 2 * count))  # x and y of each coefficient in turn
-    right = np.zeros(2 * count)
+    band: Floats = np.zeros((4, count))
+    right = np.zeros((count, 2))
     inside = np.clip(place, low, high - 1e-9)
     basis = BSpline.design_matrix(inside, knots, 3)  # four entries per row, including zeros
-    start = 2 * basis.indices[::4].astype(np.int64)
-    values = basis.data.reshape(-1, 4)
-    for axis in (0, 1):
-        observe(band, right, start + axis, values, 2, weight, points[:, axis])
-    if headings is not None:
-        lower = BSpline.design_matrix(inside, knots[1:-1], 2).data.reshape(-1, 3)
-        # Slopes of a cubic basis are differences of the quadratic one, from the same span on.
-        slope = np.zeros((len(place), 4))
-        slope[:, 1:] += lower / step
-        slope[:, :-1] -= lower / step
-        across = np.column_stack((-np.sin(headings.value), np.cos(headings.value)))
-        entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
-        shared = np.clip(spacing / _PATH.same_heading_m, _PATH.min_heading_weight, 1.0)
-        observe(band, right, start, entries, 1, headings.weight * shared, np.zeros(len(place)))
+    start = basis.indices[::4].astype(np.int64)
+    observe(band, right, start, basis.data.reshape(-1, 4), weight, points)
     for order, by_distance, by_time in (
         (2, _PATH.curvature_per_m, _PATH.lateral_m2ps3),
         (3, _PATH.steering_per_m3, _PATH.lateral_jerk_m2ps5),
@@ -186,9 +174,20 @@ def fit_path(
         centre = low + step * (rows + (order - 2) / 2.0)
         v = np.interp(centre, place, speed)
         penalty = step ** (1 - 2 * order) * (1.0 / by_distance + v ** (2 * order - 1) / by_time)
-        stencils = differences(count, order)
-        for axis in (0, 1):
-            observe(band, right, 2 * rows + axis, stencils, 2, penalty, np.zeros(len(v)))
+        observe(band, right, rows, differences(count, order), penalty)
+    if headings is not None:
+        # They tie x to y: from here on, both of each coefficient are in turn.
+        right = right.reshape(-1, 1)
+        band = np.asarray(np.kron(band, [[1.0, 1.0], [0.0, 0.0]]), dtype=np.float64)
+        lower = BSpline.design_matrix(inside, knots[1:-1], 2).data.reshape(-1, 3)
+        # Slopes of a cubic basis are differences of the quadratic one, from the same span on.
+        slope = np.zeros((len(place), 4))
+        slope[:, 1:] += lower / step
+        slope[:, :-1] -= lower / step
+        across = np.column_stack((-np.sin(headings.value), np.cos(headings.value)))
+        entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
+        shared = np.clip(spacing / _PATH.same_heading_m, _PATH.min_heading_weight, 1.0)
+        observe(band, right, 2 * start, entries, headings.weight * shared)
     coefficients = linalg.solveh_banded(band, right, lower=True).reshape(-1, 2)
     return _tabulate(BSpline(knots, coefficients, 3), low, high)
 

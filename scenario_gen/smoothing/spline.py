@@ -16,9 +16,8 @@ def observe(
     right: Floats,
     start: Ints,
     entries: Floats,
-    stride: int,
     weight: Floats,
-    target: Floats,
+    target: Floats | None = None,
 ) -> None:
     """Add Σ weight · (entries · c - target)² to a lower band matrix and its right side.
 
@@ -26,16 +25,16 @@ def observe(
         band: the matrix (B, n).
         right: the right side (n,) or (n, D).
         start: (F,) first coefficient of each row.
-        entries: (F, E) of each row, `stride` coefficients apart.
-        stride: that distance.
+        entries: (F, E) of each row.
         weight: (F,).
-        target: (F,) or (F, D).
+        target: (F,) or (F, D); None: zero.
     """
     for i in range(entries.shape[1]):
-        np.add.at(right, start + stride * i, (weight * entries[:, i] * target.T).T)
+        if target is not None:
+            np.add.at(right, start + i, (weight * entries[:, i] * target.T).T)
         for j in range(i + 1):
             products = weight * entries[:, i] * entries[:, j]
-            np.add.at(band[stride * (i - j)], start + stride * j, products)
+            np.add.at(band[i - j], start + j, products)
 
 
 def differences(count: int, order: int) -> Floats:
@@ -63,8 +62,7 @@ def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floa
     band = np.zeros((3, count))
     right = np.zeros((count, values.shape[1]))
     weight = np.gradient(u) + 1e-3 * step
-    observe(band, right, cell, np.column_stack((1.0 - share, share)), 1, weight, values)
+    observe(band, right, cell, np.column_stack((1.0 - share, share)), weight, values)
     penalty = np.full(count - 2, (wavelength / (2.0 * np.pi)) ** 4 / step**3)
-    nothing = np.zeros((count - 2, values.shape[1]))
-    observe(band, right, np.arange(count - 2), differences(count, 2), 1, penalty, nothing)
+    observe(band, right, np.arange(count - 2), differences(count, 2), penalty)
     return grid, linalg.solveh_banded(band, right, lower=True)

@@ -244,20 +244,6 @@ def test_a_fix_without_fix_is_dropped(tmp_path):
     assert drop.first.endswith("topic /vehicle_a/fix, message 11")
 
 
-def test_odometry(tmp_path):
-    (plain,) = read_log(save(crossing(), tmp_path)).encounters
-    (encounter,) = read_log(write(tmp_path / "bag", odometry(crossing()))).encounters
-    assert encounter.origin is None
-    np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
-    np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.01)
-
-
-@pytest.mark.parametrize("topic", ["/{}/odometry/filtered", "/fleet/vehicle_{}/local/ekf/odom"])
-def test_differing_topic_level_names_the_vehicle(tmp_path, topic):
-    bag = write(tmp_path / "drive", odometry(crossing(), topic))
-    assert [vehicle.id for vehicle in read_log(bag).encounters[0].vehicles] == ["a", "b"]
-
-
 @pytest.mark.parametrize(
     ("frame", "said"),
     [
@@ -348,6 +334,10 @@ def poses(rows):
 
 
 WAYS = {  # of recording two vehicles in one bag
+    "odometry": odometry,
+    "the first level in which topics differ": lambda rows: odometry(
+        rows, "/fleet/vehicle_{}/local/ekf/odom"
+    ),
     "child frames": lambda rows: odometry(rows, "/odom", child="{}/base_link"),
     "raw and filtered": lambda rows: [*odometry(rows), *odometry(rows, "/{}/odometry/filtered")],
     "transforms": transforms,
@@ -391,6 +381,7 @@ def test_ways_of_recording_two_vehicles(tmp_path, way):
     (encounter,) = read_log(write(tmp_path / "bag", way(crossing()))).encounters
     assert [vehicle.id for vehicle in encounter.vehicles] == ["a", "b"]
     np.testing.assert_allclose(encounter.position, plain.position, atol=0.3)
+    np.testing.assert_allclose(encounter.heading, plain.heading, atol=0.02)
 
 
 def test_topic_in_each_bag_names_vehicles(tmp_path):

@@ -141,7 +141,6 @@ def test_what_cannot_be_used_is_refused(tmp_path, damage):
         (LogConfig(start=100.0), "only 12.0 s long"),
         (LogConfig(start=5.0, end=4.0), "must be after start"),
         (LogConfig(start=8.0, end=9.0), "no two vehicles"),
-        (LogConfig(proximity=2.0), r"--set log\.proximity=\d+ accepts them"),
     ],
 )
 def test_parameters_that_leave_nothing(tmp_path, config, words):

@@ -189,20 +189,6 @@ def test_stamps_that_are_none_are_refused(tmp_path, stamps):
         read_log(table_with(tmp_path, stamps))
 
 
-def test_pandas_metadata_is_not_believed(tmp_path):
-    rows = pa.Table.from_pandas(crossing().set_index("t_s"))
-    for meta in (
-        b"[]",
-        b"{",
-        b'{"columns": 3, "index_columns": ["no"]}',
-        rows.schema.metadata[b"pandas"],
-    ):
-        parquet.write_table(
-            rows.replace_schema_metadata({b"pandas": meta}), tmp_path / "log.parquet"
-        )
-        assert len(read_log(tmp_path / "log.parquet").encounters) == 1
-
-
 TEXTS = {
     "a row with more fields": (
         lambda text: text.replace(",8.0\n", ",8.0,1\n", 1),
@@ -256,16 +242,6 @@ def test_numbers_and_names_of_any_length(tmp_path):
     assert drop.count == 1
 
 
-def test_impossible_vehicle_sizes_are_not_taken(tmp_path):
-    (encounter,) = read_log(
-        save(crossing().assign(length_m=1e308, width_m=2.5), tmp_path)
-    ).encounters
-    assert [(vehicle.length, vehicle.width) for vehicle in encounter.vehicles] == [
-        (4.8, 2.5),
-        (4.8, 2.5),
-    ]
-
-
 def test_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "log.csv")
     for path, said in (
@@ -279,7 +255,7 @@ def test_what_is_no_file(tmp_path):
 
 
 def test_repeated_long_texts_are_stored_once(tmp_path):
-    text = "A" * 1_000_000
+    text = "A" * 300_000
     table = {"t": [0.1 * k for k in range(400)], "id": ["a", "b"] * 200, "type": [text] * 400}
     pd.DataFrame({**table, "x": 0.0, "y": 0.0}).to_parquet(tmp_path / "log.parquet")
     tracemalloc.start()

@@ -151,11 +151,6 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
         "speeds are derived from the positions",
     ),
     "NGSIM": (ngsim, "", "feet are converted to metres"),
-    "headings clockwise from north": (
-        lambda rows: with_headings(rows).assign(heading=lambda own: np.pi / 2.0 - own.heading),
-        "",
-        "clockwise from north",
-    ),
     "headings that are zero": (
         lambda rows: with_headings(rows).assign(heading=0.0),
         "",
@@ -246,12 +241,6 @@ def test_a_clock_set_back_cuts(tmp_path, back, rate):
         and max(encounter.speed.max() for encounter in result.encounters) < 8.2
     )
     assert "the clock steps" in " ".join(result.quality.notes)
-
-
-def test_runs_that_begin_anew_are_apart(tmp_path):
-    again = crossing().assign(x_m=lambda own: own.x_m + 50.0)
-    found = read_log(save(pd.concat([crossing(), again]), tmp_path))
-    assert len(found.encounters) == 2 and "the clock steps" in " ".join(found.quality.notes)
 
 
 def test_jump_without_speeds_is_not_driven(tmp_path):
@@ -398,10 +387,6 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     "ms since 1970": (
         lambda rows: rows.assign(t_s=((rows.t_s + 1.66e9) * 1000).round()),
         "looks like ms: --set log.columns=time=t_s:ms",
-    ),
-    "x, y in degrees": (
-        lambda rows: geographic(rows).rename(columns={"lat_deg": "Y", "lon_deg": "X"}),
-        "--set log.columns=lon=X,lat=Y",
     ),
     "ids that number the rows": (
         lambda rows: rows.rename(columns={"vehicle_id": "tracker"}).assign(id=range(len(rows))),

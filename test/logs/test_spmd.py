@@ -8,7 +8,7 @@ import pytest
 from support.log_builders import crossing, geographic
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs import read_log
 from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.logs.text import SPMD_COLUMNS
 
@@ -88,10 +88,3 @@ def test_lines_that_break_off(tmp_path):
     path.write_text("\n".join([*lines[:50], lines[50] + ",1,2", *lines[51:]]))
     with pytest.raises(InputError, match=r"log\.csv.*line 51"):
         read_log(path)
-
-
-def test_the_format_can_be_asked_for(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("1,2,3\n4,5,6\n")
-    with pytest.raises(InputError, match="line 1 has numbers instead of column names"):
-        read_log(path, LogConfig(format="spmd"))

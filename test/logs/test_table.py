@@ -67,15 +67,6 @@ def test_units_and_names(tmp_path, change):
     same(plain, other)
 
 
-def test_parquet_and_other_separators(tmp_path):
-    (plain,) = read_log(save(crossing(), tmp_path)).encounters
-    crossing().to_parquet(tmp_path / "log.parquet")
-    crossing().to_csv(tmp_path / "semicolons.csv", sep=";", index=False)
-    for name in ("log.parquet", "semicolons.csv"):
-        (other,) = read_log(tmp_path / name).encounters
-        np.testing.assert_array_equal(other.position, plain.position)
-
-
 def test_latitude_and_longitude_become_local(tmp_path):
     (plain,) = read_log(save(crossing(), tmp_path)).encounters
     (other,) = read_log(save(geographic(crossing()), tmp_path)).encounters

@@ -35,7 +35,7 @@ from scenario_gen.situation import (
     smallest_gaps,
     Track,
     track_conflicts,
-    turns_to_keep,
+    turn_of,
 )
 from scenario_gen.types import LEVEL_SPACING_M, Loss, Motion
 
@@ -185,7 +185,7 @@ class Candidate:
     def surely_lost(self) -> int:
         """How many crossings and turns are lost; other losses are expensive to find."""
         turns = sum(
-            not all(is_same_turn(turn, path.turn) for turn in turns_to_keep(track))
+            not is_same_turn(turn_of(track), path.turn)
             for track, path in zip(self.task.drivers, self.match.paths, strict=True)
             if not follows_bend(track)
         )

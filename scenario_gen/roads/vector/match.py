@@ -44,7 +44,7 @@ from scenario_gen.situation import (
     PairConflicts,
     solve_placement,
     Track,
-    turns_to_keep,
+    turn_of,
     WAIT_SPEED_MPS,
 )
 from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
@@ -390,7 +390,7 @@ def _start_to_turn(path: LanePath, track: Track) -> float | None:
 
     It is None if the vehicle does so already, or from no start.
     """
-    turn, driven = float(np.mean(turns_to_keep(track))), float(path.progress[-1])
+    turn, driven = turn_of(track), float(path.progress[-1])
     if track.still or abs(path.turn - turn) < LIMITS.noticeable_turn_error_rad:
         return None
     starts = np.arange(0.0, max(path.curve.length - driven, 0.0), STEP_M)
