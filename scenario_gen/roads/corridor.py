@@ -3,12 +3,14 @@
 
 """The corridor: the area that recorded vehicles sweep, in the recording's frame."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
@@ -16,7 +18,7 @@ from scenario_gen.roads.drawn import crossing_lane, draw_lanes, middle_stations
 from scenario_gen.roads.lights import recorded_rules
 from scenario_gen.roads.pavement import drivable_width, paved, swept
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, Lane, LaneNetwork, Road, trailer_poses
+from scenario_gen.types import Encounter, Lane, LaneNetwork, Road, trailer_poses, Vehicle
 
 _FOOTPRINT_STEP_M = 0.25
 
@@ -50,14 +52,9 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
             paths[name_of_vehicle] = path
     lanes: list[Lane] = []
     for lane_name, sharing in sharing_lanes(paths).items():
-        path, vehicles = paths[lane_name], [tracks[each].vehicle for each in sharing]
-        line = path.cut(0.0, path.length, 1.0)
-        width = max(vehicle.width for vehicle in vehicles) + 2.0 * config.corridor_margin
-        half = np.full(len(line.points), width / 2.0)
-        for trailer in filter(None, (vehicle.trailer for vehicle in vehicles)):
-            towed = trailer_poses(line.points, trailer)
-            station, offset = line.project(towed[:, :2])
-            half += np.interp(line.station, station, np.abs(offset))
+        line = paths[lane_name].cut(0.0, paths[lane_name].length, 1.0)
+        vehicles = [tracks[each].vehicle for each in sharing]
+        half = _half_widths(line, vehicles, config.corridor_margin)
         lanes.append(lane_along(f"along vehicle {lane_name}", line, half))
     rules = tuple(recorded_rules(encounter, lanes, config.priority))
     network = LaneNetwork(name, tuple(lanes), rules=rules, drawn=True)
@@ -74,3 +71,14 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
     )
     crossing = crossing_lane("crossing 1", line, stations, (right, left))
     return replace(road, lanes=road.lanes.with_lanes((*lanes, crossing)))
+
+
+def _half_widths(line: Curve, vehicles: Sequence[Vehicle], margin: float) -> Floats:
+    """Return half the width (M,) [m] that vehicles and their trailers need along a line."""
+    width = max(vehicle.width for vehicle in vehicles) + 2.0 * margin
+    half = np.full(len(line.points), width / 2.0)
+    for trailer in filter(None, (vehicle.trailer for vehicle in vehicles)):
+        towed = trailer_poses(line.points, trailer)
+        station, offset = line.project(towed[:, :2])
+        half += np.interp(line.station, station, np.abs(offset))
+    return half

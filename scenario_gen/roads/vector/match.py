@@ -114,8 +114,7 @@ def match(
         ends = hypothesis.ends[n] if hypothesis.ends else ("", "")
         if prefer_reserved and graph.reserved_for(track):  # the named lanes are for cars
             ends = "", ""
-        on_way = poses if hypothesis.may_begin_before else poses[:1]
-        firsts = next(filter(None, map(graph.near, on_way)), [])
+        firsts = _first_lanes(graph, poses[: None if hypothesis.may_begin_before else 1])
         path = _lane_path(
             graph, track, poses, scale, firsts, ends, prefer_reserved=prefer_reserved
         )
@@ -140,6 +139,11 @@ def match(
     ]
     if turning:
         yield judged(turning)
+
+
+def _first_lanes(graph: LaneGraph, poses: Floats) -> list[int]:
+    """Return the lanes near the first of some poses (K, 3) that has any."""
+    return next(filter(None, map(graph.near, poses)), [])
 
 
 def _swerving(path: LanePath, swerve: Floats) -> LanePath:
