@@ -89,7 +89,7 @@ def test_small_bag_catches_all_mutants(tmp_path):
     """Of two bags; names of the scenarios differ in it, verdicts do not."""
     (encounter,) = read_log("examples/my_log.csv").encounters
     config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
-    made = generate(encounter, "four_way", config, count=2, seed=7)
+    made = generate(encounter, "four_way", config, count=4, seed=7)
     for place in ("one", "two"):
         write_recording(tmp_path / place, made)
     planner = "scenario_gen.closed_loop.planners:IdmFollower"
