@@ -9,6 +9,7 @@ All serve the command and the library.
 import json
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -90,7 +91,8 @@ def test_the_command_takes_all_by_name(python):
     python("-m", "scenario_gen", "export", "out/bag", "--to", "states", "--out", "tables")
     manifest = json.loads((python.folder / "tables" / "export.json").read_text())
     names = [name for entry in manifest["scenarios"] for name in entry["files"]]
-    assert manifest["format"] == "states" and names == ["case_1_0.csv", "case_1_1.csv"]
+    assert manifest["format"] == "states" and len(names) == 2
+    assert all(re.fullmatch(r"case_1_\d+\.csv", name) for name in names)
     lines = (python.folder / "tables" / names[0]).read_text().splitlines()
     assert lines[0] == "time,vehicle,x,y,heading,speed" and len(lines) > 100
 

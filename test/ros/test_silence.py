@@ -103,7 +103,7 @@ def test_late_work_is_not_published(ros, client: Client, monkeypatch, cleaned, f
 
 
 def test_evaluator_gives_up_lost_requests(ros, client: Client):
-    from scenario_gen.ros.nodes.evaluator import Evaluator
+    from scenario_gen.ros.nodes.evaluator import Evaluator, MAX_REQUEST_COUNT
 
     node = Evaluator()
     client.hear("/diagnostics")
@@ -111,7 +111,7 @@ def test_evaluator_gives_up_lost_requests(ros, client: Client):
         node.trigger_configure()
         node.trigger_activate()
         spun(node, lambda: _said(client).endswith("active"))
-        for k in range(node.config.wait + 1):
+        for k in range(MAX_REQUEST_COUNT + 1):
             entry = ScenarioEntry(0, {}, str(k), 0, 0, f"{k:064x}")
             node.received("scenarios/info", encode_info(entry))
             closing = RequestSummary(0, {}, str(k), 0, 1, 1, 1)
