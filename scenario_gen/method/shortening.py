@@ -5,12 +5,12 @@
 
 Each vehicle's track may lose its begin and its end, as long as all conflicts, orders, reactions,
 waits and turns remain (`interaction_windows`). On a map it is cut to where the lanes reach. Else
-the shortest part tells whether shortening helps; then longer ones are tried, the one with the
-smallest loss first: the same time for all vehicles, in quarters; then a time for each; and at last
-the beginning of a braking may be lost.
+the shortest parts tell whether shortening helps; then longer ones are tried, the one with the
+smallest loss first: the same time for all vehicles, in quarters; then a time for each, likewise;
+and at last the beginning of a braking may be lost.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice, product
 from typing import Generic, NamedTuple, TypeVar
@@ -30,8 +30,9 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import Encounter, Note, NoteKind, YIELD
 
-_COMMON_LOSS_SHARE = (0.25, 0.5, 0.75, 1.0)  # of what all vehicles can lose
+_LOSS_SHARES = (0.25, 0.5, 0.75, 1.0)  # of what can be lost
 _PROPOSED_COUNT = 2  # places on a map for which a part is tried
+_TIGHTEST_COUNT = 3  # parts of which one must fit, or no longer one is tried
 
 Made = TypeVar("Made")
 
@@ -109,13 +110,16 @@ class _Search(Generic[Made]):
     def shortest_loss(self, windows: Sequence[Floats]) -> Encounter | None:
         """Return the recording with the smallest loss found; None if it does not fit shortened."""
         ways = list(self._ways())
-        for way in islice(self._proposed(windows, ways[-2:]), _PROPOSED_COUNT):
-            if best := self._fitting(way):
-                return best
-        tightest = self._fitting(ways[-1]) if ways else None
+        proposed = islice(self._proposed(windows, ways[-2:]), _PROPOSED_COUNT)
+        if best := self._first_fitting(proposed):
+            return best
+        tightest = self._first_fitting(ways[-_TIGHTEST_COUNT:])
         if tightest is None:  # the others are longer
             return None
-        return next(filter(None, map(self._fitting, ways[:-1])), tightest)
+        return self._first_fitting(ways[:-1]) or tightest
+
+    def _first_fitting(self, ways: Iterable[_Way]) -> Encounter | None:
+        return next(filter(None, map(self._fitting, ways)), None)
 
     def _ways(self) -> Iterator[_Way]:
         """Yield the ways of shortening that keep the interaction, the longest first."""
@@ -128,8 +132,9 @@ class _Search(Generic[Made]):
             for kept in (True, False)
         )
         common = np.tile((each[:, 0].min(), each[:, 1].max()), (len(each), 1))
-        ways = [_Way(whole + share * (common - whole), True) for share in _COMMON_LOSS_SHARE]
-        ways += [_Way(each, True), _Way(braking, False)]
+        shares = product((common, each), _LOSS_SHARES)
+        ways = [_Way(whole + share * (shortest - whole), True) for shortest, share in shares]
+        ways.append(_Way(braking, False))
         for k, way in enumerate(ways):
             new = not any(np.array_equal(way.windows, other.windows) for other in ways[:k])
             shortens = np.abs(way.windows - whole).max() >= MIN_LOSS_S
