@@ -61,7 +61,7 @@ SCENES = (
         "Following around a roundabout",
         f"{RECORDED}/v2x_following.csv",
         "roundabout",
-        view=190.0,
+        view=240.0,
     ),
     Scene(
         "map",

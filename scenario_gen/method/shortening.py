@@ -30,7 +30,7 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import Encounter, Note, NoteKind, YIELD
 
-_LOSS_SHARES = (0.25, 0.5, 0.75, 1.0)  # of what can be lost
+_LOSS_SHARE = (0.25, 0.5, 0.75, 1.0)  # of what can be lost
 _PROPOSED_COUNT = 2  # places on a map for which a part is tried
 _TIGHTEST_COUNT = 3  # parts of which one must fit, or no longer one is tried
 
@@ -132,7 +132,7 @@ class _Search(Generic[Made]):
             for kept in (True, False)
         )
         common = np.tile((each[:, 0].min(), each[:, 1].max()), (len(each), 1))
-        shares = product((common, each), _LOSS_SHARES)
+        shares = product((common, each), _LOSS_SHARE)
         ways = [_Way(whole + share * (shortest - whole), True) for shortest, share in shares]
         ways.append(_Way(braking, False))
         for k, way in enumerate(ways):
