@@ -279,7 +279,7 @@ def least_room(
 
     The clearance field (H, W) tells which poses and squares cannot be nearer than the best.
     """
-    radius = np.hypot(half_length, half_width) + _HALF_DIAGONAL_CELLS
+    radius = np.hypot(half_length, half_width)
     best = farthest
     for p in range(len(poses)):
         x, y = poses[p, 0], poses[p, 1]
