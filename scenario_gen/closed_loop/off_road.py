@@ -22,7 +22,7 @@ from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import F, F2, kernel
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import footprint_fits, to_cells
-from scenario_gen.roads.clearance import is_open
+from scenario_gen.roads.clearance import footprint_free, is_open
 from scenario_gen.types import Motion, Obstacle, Road
 
 POSE_SPACING_M = 0.05
@@ -181,18 +181,6 @@ def _nearest_open(
 
 
 @kernel(inline=True)
-def _all_open(clearance: Floats, part: Box) -> bool:
-    """Return whether all squares around a rectangle are drivable."""
-    across = part.length * abs(part.cos) + part.width * abs(part.sin)
-    along = part.length * abs(part.sin) + part.width * abs(part.cos)
-    for i in range(int(np.floor(part.y - along)), int(np.floor(part.y + along)) + 1):
-        for j in range(int(np.floor(part.x - across)), int(np.floor(part.x + across)) + 1):
-            if not is_open(clearance, i, j):
-                return False
-    return True
-
-
-@kernel(inline=True)
 def _to_square(x: float, y: float, column: int, row: int) -> float:
     """Return the distance [cells] from a point to a square."""
     across = max(column - x, x - column - 1.0, 0.0)
@@ -261,7 +249,7 @@ def greatest_depth(
         parts = [Box(x, y, np.cos(yaw), np.sin(yaw), half_length, half_width)]
         while len(parts) > 0 and best < enough:
             part = parts.pop()
-            if _all_open(clearance, part):
+            if footprint_free(clearance, part.x, part.y, yaw, part.length, part.width):
                 continue
             _, column, row = _nearest_open(clearance, part.x, part.y, farthest)
             bound, x, y = _farthest_corner(part, column, row)

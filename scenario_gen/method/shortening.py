@@ -116,7 +116,7 @@ class _Search(Generic[Made]):
         tightest = self._first_fitting(ways[-_TIGHTEST_COUNT:])
         if tightest is None:  # the others are longer
             return None
-        return self._first_fitting(ways[:-1]) or tightest
+        return self._first_fitting(ways[:-_TIGHTEST_COUNT]) or tightest
 
     def _first_fitting(self, ways: Iterable[_Way]) -> Encounter | None:
         return next(filter(None, map(self._fitting, ways)), None)

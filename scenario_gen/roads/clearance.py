@@ -262,7 +262,7 @@ def _extent_in_row(corner_x: Floats, corner_y: Floats, i: int) -> tuple[float, f
 
 
 @kernel(inline=True)
-def _footprint_free(
+def footprint_free(
     clearance: Floats, x: float, y: float, yaw: float, half_length: float, half_width: float
 ) -> bool:
     """Return whether the rectangle at one pose covers drivable cells only."""
@@ -294,6 +294,6 @@ def check_footprints(
 ) -> None:
     """Check M footprints with poses (M, 3) in cells and rad; writes fits (M,)."""
     for m in range(poses.shape[0]):
-        fits[m] = _footprint_free(
+        fits[m] = footprint_free(
             clearance, poses[m, 0], poses[m, 1], poses[m, 2], half_length, half_width
         )
