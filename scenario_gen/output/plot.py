@@ -160,9 +160,9 @@ def draw_map(name: str, file: Path, encounter: Encounter | None = None) -> list[
         title, lanes = road.name, "a grid without lanes"
         if road.lanes is not None:
             _draw_lanes(axes, road.lanes)
-            lanes = f"{len(road.lanes.lanes)} lanes"
-        arms = f"{len(road.entries)} entries, {len(road.exits)} exits"
-        lines = [f"{road.name}: {road!r}, {lanes}, {arms}"]
+            ends = f"{len(road.entries)} entries, {len(road.exits)} exits"
+            lanes = f"{len(road.lanes.lanes)} lanes, {ends}"
+        lines = [f"{road.name}: {road!r}, {lanes}"]
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{title}\n{_LEGEND}")
     figure.savefig(file)
     return lines

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Occupancy grids, their entries and exits, and the readers of map formats."""
+"""Roads: drawn ones, occupancy grids, and the readers of map formats."""
 
 from scenario_gen.roads.build import (
     build_road,

@@ -17,7 +17,6 @@ from scenario_gen.base.documents import read_yaml, shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.openings import find_openings
 from scenario_gen.types import MAX_CELL_M, MAX_ORIGIN_M, MIN_CELL_M, Road
 
 _MODES = ("trinary", "scale", "raw")
@@ -74,8 +73,7 @@ def read_map(path: Path, config: RoadConfig) -> Road:
             f"map {path}: no cell of {file.name} is free with free_thresh {free} and negate "
             f"{negate}"
         )
-    entries, exits = find_openings(drivable, resolution, origin, config)
-    return Road(path.stem, drivable, resolution, origin, entries, exits)
+    return Road(path.stem, drivable, resolution, origin)
 
 
 def _is_number(value: Any) -> bool:

@@ -11,20 +11,19 @@ from shapely import contains_xy, MultiPolygon, Polygon, prepare
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
-from scenario_gen.roads.openings import find_openings
 from scenario_gen.types import Road
 
 Shape: TypeAlias = Bools | Polygon | MultiPolygon
 
 
 def road_of_shape(shape: Shape, config: RoadConfig = RoadConfig()) -> Road:
-    """Return the road of a drivable shape; traffic enters and leaves at the border of its grid.
+    """Return the road of a drivable shape, a grid without lanes.
 
     Args:
         shape: (H, W) bool, drivable cells of `config.resolution`, row 0 the lowest y, the
             lower-left corner at (0, 0); or a polygon in metres: cells with their centre inside
             are drivable.
-        config: cell size, lane width, and side of traffic.
+        config: cell size, and the most cells.
 
     Raises:
         InputError: the array has another shape or type, the polygon is invalid or empty, or
@@ -39,8 +38,7 @@ def road_of_shape(shape: Shape, config: RoadConfig = RoadConfig()) -> Road:
         raise InputError(
             f"road: a name, a path, an array or a polygon is needed, not {type(shape).__name__}"
         )
-    entries, exits = find_openings(drivable, config.resolution, origin, config)
-    return Road(name, drivable, config.resolution, origin, entries, exits)
+    return Road(name, drivable, config.resolution, origin)
 
 
 def _checked(array: Bools, config: RoadConfig) -> Bools:

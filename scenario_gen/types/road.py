@@ -4,7 +4,7 @@
 """A target road: what is drivable, and where traffic comes in and goes out."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -42,7 +42,7 @@ _CHUNK_CELLS = 4096
 
 @dataclass(frozen=True, eq=False)
 class Road:
-    """An occupancy grid with entries and exits.
+    """An occupancy grid, and the lanes from which it was drawn.
 
     Attributes:
         name: e.g. "t_intersection", or the stem of the map's file; for people, nothing is computed
@@ -53,7 +53,7 @@ class Road:
         origin: (2,) x, y in metres of the lower-left corner of cell (0, 0); the grid is not
             rotated.
         entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the
-            road.
+            road; (0, 3) without lanes.
         exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the
             road.
         frame_id: the frame of all poses.
@@ -67,8 +67,8 @@ class Road:
     drivable: Bools
     resolution: float
     origin: Floats
-    entries: Floats
-    exits: Floats
+    entries: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    exits: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     frame_id: str = "map"
     lanes: LaneNetwork | None = None
     obstructed: Bools | None = None

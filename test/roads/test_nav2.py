@@ -10,7 +10,6 @@ import pytest
 from scenario_gen.base.errors import InputError
 from scenario_gen.roads import build_road
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.openings import find_openings
 
 GOOD = {
     "image": "map.pgm",
@@ -137,26 +136,9 @@ def test_other_image_formats_are_refused(tmp_path):
         build_road(write(tmp_path, image="map.tga"), None)
 
 
-def test_too_many_lanes_are_refused(tmp_path):
-    with pytest.raises(InputError, match="1000 lanes"):
-        find_openings(np.ones((500, 500), dtype=bool), 5.0, np.zeros(2), RoadConfig())
+def test_impossible_cells_are_refused(tmp_path):
     with pytest.raises(InputError, match="resolution"):
         build_road(write(tmp_path, [[254, 0]], resolution="1e9"), None)
-
-
-def test_openings_keep_to_their_side():
-    drivable = np.zeros((100, 200), dtype=bool)
-    drivable[30:65, :] = True  # 7 m of road along x at 0.2 m
-    entries, exits = find_openings(drivable, 0.2, np.zeros(2), RoadConfig())
-    east_bound, west_bound = 6.0 + 1.75, 6.0 + 5.25
-    assert sorted(np.round(entries, 6).tolist()) == [
-        pytest.approx([0.0, east_bound, 2.0 * np.pi]),
-        pytest.approx([40.0, west_bound, np.pi]),
-    ]
-    assert sorted(np.round(exits, 6).tolist()) == [
-        pytest.approx([0.0, west_bound, np.pi]),
-        pytest.approx([40.0, east_bound, 0.0]),
-    ]
 
 
 def test_every_recorded_map_is_read(data):

@@ -22,7 +22,7 @@ def test_polygon_is_drivable_with_open_ends():
         True,
         False,
     ]
-    assert len(road.entries) == len(road.exits) == 4
+    assert len(road.entries) == len(road.exits) == 0 and road.lanes is None
 
 
 def test_array_is_taken_as_it_is():

@@ -124,9 +124,8 @@ class RoadServer(StageNode):
         self._grid = messages["map"]
         template = {"map": self._grid} | ({"tracks": tracks} if tracks else {})
         height, width = road.drivable.shape
-        message = (
-            f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, "
-            f"{len(road.entries)} entries"
+        message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, " + (
+            "no lanes" if road.lanes is None else f"{len(road.entries)} entries"
         )
         faults = [
             str(note)
