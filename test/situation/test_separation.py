@@ -6,19 +6,20 @@
 import numpy as np
 import pytest
 
-from scenario_gen.situation import interaction_windows, Situation
-from scenario_gen.situation.separation import least_gaps
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.situation import clean_tracks, interaction_windows, Situation
+from scenario_gen.situation.separation import least_gaps, separate
 from scenario_gen.types import ALWAYS, Encounter, Vehicle
 
 TIME = 0.1 * np.arange(30)
 
 
-def queue(*places, present=ALWAYS):
-    """Vehicles of 4 m by 2 m that drive along x at 5 m/s, so many metres ahead of the first one's place."""
+def queue(*places, present=ALWAYS, width=2.0):
+    """Vehicles of 4 m by 2 m, or another width, that drive along x at 5 m/s, so many metres ahead of the first one's place."""
     way = np.column_stack([5.0 * TIME, np.zeros(len(TIME))])
     position = np.stack([way + np.array([x, 0.0]) for x in places])
     count = len(places)
-    vehicles = tuple(Vehicle(str(n), 4.0, 2.0) for n in range(count))
+    vehicles = tuple(Vehicle(str(n), 4.0, width) for n in range(count))
     flat = np.zeros((count, 30))
     return Encounter.sampled(vehicles, 0.1, position, flat, flat + 5.0, "queue", present=present)
 
@@ -47,3 +48,21 @@ def test_nearest_instants_are_needed(meet, begin):
     windows = interaction_windows(Situation.of(passing))
     assert windows[:, 1] - windows[:, 0] == pytest.approx(5.0)
     assert windows[:, 0] == pytest.approx(begin, abs=0.06)
+
+
+@pytest.mark.parametrize("free", [0.6, 1.2])
+def test_queue_is_pulled_apart_lengthwise(free):
+    """Two overlap by 0.49 m; a third is free of them until the second is moved towards it."""
+    tracks = clean_tracks(queue(0.0, 3.51, 7.51 + free, width=0.6))
+    separation = separate(tracks, 0.5, 1.0, sideways=0.0)
+    x = np.stack([track.poses[:, 0] for track in separation.tracks])
+    assert (np.diff(x, axis=0) > 4.499).all()
+    assert np.ptp(x[:, 0]) == pytest.approx(max(9.0, 8.005 + free), abs=0.01)
+
+
+def test_longer_shifts_are_refused():
+    """Two pairs overlap by 0.49 m: 1.45 m between them are less than shifts of 0.5 m need."""
+    tracks = clean_tracks(queue(0.0, 3.51, 8.96, 12.47, width=0.6))
+    assert separate(tracks, 0.5, 0.6, sideways=0.0).moved.max() > 0.5
+    with pytest.raises(RefusedError):
+        separate(tracks, 0.5, 0.5, sideways=0.0)
