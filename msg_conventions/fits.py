@@ -22,7 +22,7 @@ from msg_conventions.paths import encode_route
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Ints
 from scenario_gen.types import (
     BoundaryStates,
     Encounter,
@@ -163,28 +163,6 @@ def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     )
     return trajectory.encode(
         Trajectory(encounter.start_ns, frame_id, fit.vehicles, time_ns, *states)
-    )
-
-
-def decode_fit(data: bytes, source: str = "fit") -> tuple[int, str, BoundaryStates, Floats]:
-    """Return stamp [ns], frame, the requested states, and the anchors (N, K + 2, 3) x, y, yaw.
-
-    Raises:
-        InputError: the message is damaged or has no start and end.
-    """
-    message = trajectory.decode(data, source)
-    if len(message.time_ns) < 2:
-        raise InputError(
-            f"{source}: {len(message.time_ns)} point(s); a start and an end are needed"
-        )
-    state = np.concatenate(
-        [message.position, message.heading[..., None], message.speed[..., None]], axis=-1
-    )
-    return (
-        message.stamp_ns,
-        message.frame_id,
-        BoundaryStates(start=state[:, 0], end=state[:, -1]),
-        state[..., :3],
     )
 
 

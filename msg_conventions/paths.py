@@ -15,12 +15,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from msg_conventions.cdr import decode, encode
+from msg_conventions.cdr import encode
 from msg_conventions.layouts import PATH
 from msg_conventions.poses import pose_rows, poses_of
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
@@ -39,21 +38,6 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
         for stamp, row in zip(stamps_ns.tolist(), pose_rows(poses), strict=True)
     ]
     return encode(PATH, stamp=stamp_ns, frame_id=frame_id, poses=stamped)
-
-
-def decode_path(data: bytes, source: str = "path") -> tuple[int, str, Floats, Ints]:
-    """Return stamp [ns], frame, poses (M, 3) and their stamps (M,) [ns].
-
-    Raises:
-        InputError: the message is damaged, or a pose is in another frame than the path.
-    """
-    path = decode(PATH, data, source, framed=True)
-    for k, pose in enumerate(path.poses):
-        if pose.frame_id not in (path.frame_id, ""):
-            raise InputError(
-                f"{source}: pose {k} is in frame {pose.frame_id!r}, the path in {path.frame_id!r}"
-            )
-    return path.stamp, path.frame_id, *timed_poses(path, source)
 
 
 def timed_poses(path: SimpleNamespace, source: str) -> tuple[Floats, Ints]:
@@ -87,39 +71,3 @@ def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> byte
         stamps += [*(elapsed + anchors_ns[k - 1]).tolist(), anchors_ns[k]]
     stamps_ns = np.array(stamps, dtype=np.int64)
     return encode_path(route.points[index], stamps_ns, frame_id, anchors_ns[0])
-
-
-def decode_route(
-    data: bytes, anchors_ns: Sequence[int], source: str = "route"
-) -> tuple[str, Route]:
-    """Return the frame and the route.
-
-    Raises:
-        InputError: the message is damaged, bears another stamp, or has no pose at an anchor's
-            stamp.
-    """
-    stamp_ns, frame_id, poses, stamps = decode_path(data, source)
-    if stamp_ns != anchors_ns[0]:
-        raise InputError(
-            f"{source}: stamp {stamp_ns} ns is not that of the recording ({anchors_ns[0]} ns)"
-        )
-    if len(poses) == 0:
-        raise InputError(f"{source}: the path holds no poses")
-    if (np.diff(stamps) < 0).any():
-        bad = int(np.argmax(np.diff(stamps) < 0))
-        raise InputError(
-            f"{source}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must "
-            "not decrease"
-        )
-    moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
-    at = np.searchsorted(stamps, anchors_ns)
-    missing = (at >= len(stamps)) | (stamps[np.minimum(at, len(stamps) - 1)] != anchors_ns)
-    if missing.any():
-        raise InputError(
-            f"{source}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every "
-            "changepoint needs one"
-        )
-    points = poses[moved]
-    return frame_id, Route(
-        points=points, anchor=(np.cumsum(moved) - 1)[at], length=arc_lengths(points[:, :2])
-    )

@@ -58,7 +58,6 @@ class Action(IntEnum):
     """Actions of markers."""
 
     ADD = 0
-    DELETE = 2
     DELETE_ALL = 3
 
 

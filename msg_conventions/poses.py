@@ -120,22 +120,15 @@ def encode_odometry(
     return encode(ODOMETRY, stamp=stamp_ns, frame_id=frame_id, child=child, pose=pose, twist=twist)
 
 
-def decode_odometry(
-    data: bytes, source: str = "odom", *, framed: bool = False
-) -> tuple[int, str, str, Floats]:
+def decode_odometry(data: bytes, source: str = "odom") -> tuple[int, str, str, Floats]:
     """Return stamp [ns], frame, child frame and the state (5,) x, y, yaw, speed, yaw rate.
 
     Units: m, rad, m/s, rad/s.
 
-    Args:
-        data: CDR bytes.
-        source: names the message in errors.
-        framed: whether its frame must not be empty.
-
     Raises:
-        InputError: the message is damaged, or a value is not finite.
+        InputError: naming `source`, the message is damaged, or a value is not finite.
     """
-    message = decode(ODOMETRY, data, source, framed=framed)
+    message = decode(ODOMETRY, data, source)
     if not np.isfinite(message.twist).all():
         raise InputError(f"{source}: the twist holds a value that is not finite")
     state = np.append(poses_of(message.pose[None], source)[0], message.twist[[0, 5]])

@@ -20,7 +20,7 @@ import numpy as np
 from msg_conventions.cdr import decode, encode
 from msg_conventions.documents import decode_document, encode_document, hash_of, LANES
 from msg_conventions.layouts import MAP, POSES
-from msg_conventions.poses import check_quaternions, MAX_COORDINATE_M, pose_rows, poses_of, yaw
+from msg_conventions.poses import check_quaternions, MAX_COORDINATE_M, pose_rows, yaw
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import LaneNetwork, Road
@@ -84,16 +84,6 @@ def encode_grid(
 def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:
     """Return entries or exits, (M, 3) x, y, yaw, as CDR bytes."""
     return encode(POSES, stamp=stamp_ns, frame_id=frame_id, poses=pose_rows(poses))
-
-
-def decode_poses(data: bytes, source: str = "poses") -> tuple[int, str, Floats]:
-    """Return stamp [ns], frame and (M, 3) x, y, yaw.
-
-    Raises:
-        InputError: the message is damaged.
-    """
-    message = decode(POSES, data, source, framed=True)
-    return message.stamp, message.frame_id, poses_of(message.poses, source)
 
 
 def encode_description(road: Road, grid: bytes, stamp_ns: int) -> bytes:

@@ -8,9 +8,10 @@ import pytest
 from support.message_decoders import decode_state
 
 from msg_conventions import trajectory
+from msg_conventions.driving import decode_timed_path
 from msg_conventions.ego import encode_state
-from msg_conventions.paths import decode_path, decode_route, encode_path
-from msg_conventions.roads import decode_map, decode_poses, encode_map, encode_poses
+from msg_conventions.paths import encode_path
+from msg_conventions.roads import decode_map, encode_map
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.trajectory import Trajectory
@@ -69,17 +70,6 @@ def test_broken_rule_of_time_is_named(time_ns, words):
         decode_scenario(trajectory.encode(sent))
 
 
-def test_routes_without_ordered_poses():
-    for count, words in (
-        (0, "the path holds no poses"),
-        (2, "pose 1 bears an earlier stamp than pose 0"),
-    ):
-        with pytest.raises(InputError, match=words):
-            decode_route(
-                encode_path(np.zeros((count, 3)), np.array([9, 7])[:count], "map", 7), [7, 9]
-            )
-
-
 def _messages(frame: str) -> dict[str, tuple[object, bytes]]:
     """A decoder and a message of each kind with poses; every heading is 0."""
     pose = np.zeros((2, 3))
@@ -87,15 +77,14 @@ def _messages(frame: str) -> dict[str, tuple[object, bytes]]:
     object.__setattr__(road, "frame_id", frame)
     return {
         "tracks": (decode_tracks, _tracks(2, 3, frame)),
-        "poses": (decode_poses, encode_poses(pose, frame, 7)),
-        "path": (decode_path, encode_path(pose, np.array([7, 8]), frame, 7)),
+        "path": (decode_timed_path, encode_path(pose, np.array([7, 8]), frame, 7)),
         "state": (decode_state, encode_state(np.zeros(4), "vehicle_a", frame, 7)),
         "map": (decode_map, encode_map(road, 7)),
     }
 
 
-@pytest.mark.parametrize("kind", ["tracks", "poses", "path", "state", "map"])
-def test_empty_frames_and_quaternions_of_zeros(kind):
+@pytest.mark.parametrize("kind", ["tracks", "path", "state", "map"])
+def test_quaternions_of_zeros(kind):
     decode, data = _messages("map")[kind]
     decode(data)
     assert UNTURNED in data
@@ -103,5 +92,10 @@ def test_empty_frames_and_quaternions_of_zeros(kind):
         InputError, match=rf"{kind}.*: quaternion 0 is \(0, 0, 0, 0\), which is no rotation"
     ):
         decode(data.replace(UNTURNED, bytes(32)))
+
+
+@pytest.mark.parametrize("kind", ["tracks", "map"])
+def test_empty_frames(kind):
+    decode, data = _messages("")[kind]
     with pytest.raises(InputError, match=rf"{kind}: header\.frame_id is empty; name the frame"):
-        decode(_messages("")[kind][1])
+        decode(data)

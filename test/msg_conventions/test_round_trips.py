@@ -38,11 +38,10 @@ from msg_conventions import (
     trajectory,
 )
 from msg_conventions.cdr import decode, encode
-from msg_conventions.layouts import STRING
+from msg_conventions.layouts import PATH, STRING
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
-from scenario_gen.numerics.plane import arc_lengths
-from scenario_gen.types import Facts, Loss, Note, NoteKind, token, tokens, Vehicle
+from scenario_gen.types import Facts, Loss, Note, NoteKind, Route, token, tokens, Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 from scenario_gen.types.road import Road
@@ -213,19 +212,14 @@ def test_unknown_cells_are_not_drivable():
 def test_route(seed, frame):
     sent = route(seed)
     anchors = [5_000_000_000, 6_100_000_000, 7_000_000_000, 7_000_000_001, 9_000_000_000]
-    got_frame, got = paths.decode_route(paths.encode_route(sent, anchors, frame), anchors)
-    assert got_frame == frame
-    assert_same(sent, got, "points", "anchor", "length")
-    assert (got.length == arc_lengths(sent.points[:, :2])).all()
-
-
-def test_route_without_changepoint_pose_is_refused():
-    anchors = [5_000_000_000, 6_100_000_000, 7_000_000_000, 8_000_000_000, 9_000_000_000]
-    data = paths.encode_route(route(1), anchors, "map")
-    with pytest.raises(InputError, match="changepoint 2"):
-        paths.decode_route(data, [*anchors[:2], 7_000_000_007, *anchors[3:]])
-    with pytest.raises(InputError, match="stamp"):
-        paths.decode_route(data, [4_000_000_000, *anchors[1:]])
+    path = decode(PATH, paths.encode_route(sent, anchors, frame), "route")
+    assert (path.stamp, path.frame_id) == (anchors[0], frame)
+    poses, stamps = paths.timed_poses(path, "route")
+    at = np.searchsorted(stamps, anchors)
+    assert (stamps[at] == anchors).all() and (np.diff(stamps) >= 0).all()
+    moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
+    got = Route(poses[moved], (np.cumsum(moved) - 1)[at], sent.length)
+    assert_same(sent, got, "points", "anchor")
 
 
 def _fit(template, at) -> Fit:
@@ -252,11 +246,12 @@ def test_fit():
     template = encounter(3)
     at = np.array([0, 7, 20, 39])
     sent = _fit(template, at)
-    stamp, frame, asked, anchors = fits.decode_fit(fits.encode_fit(template, sent, "map"))
-    assert (stamp, frame) == (template.start_ns, "map")
-    assert_same(sent.requested, asked, "start", "end")
+    got = trajectory.decode(fits.encode_fit(template, sent, "map"), "fit")
+    assert (got.stamp_ns, got.frame_id) == (template.start_ns, "map")
+    states = np.dstack([got.position, got.heading, got.speed])
+    assert_same(sent.requested, BoundaryStates(states[:, 0], states[:, -1]), "start", "end")
     assert (
-        canonical_angle(anchors[..., 2]) == np.stack([v.anchors for v in sent.fitted])[..., 2]
+        canonical_angle(got.heading) == np.stack([v.anchors for v in sent.fitted])[..., 2]
     ).all()
     assert fits.anchor_stamps(template, at[1:-1]) == [
         template.start_ns + int(k) * template.dt_ns for k in at

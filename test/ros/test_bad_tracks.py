@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from support.suite_processes import memory, Processes, RESOURCES
 
+from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
-from msg_conventions.fits import decode_fit
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.logs import read_log
 from scenario_gen.types import ALWAYS
@@ -70,7 +70,7 @@ def test_bad_tracks_are_named_by_nodes(tmp_path, domain, client):
         later = replace(good, start_ns=good.start_ns + 10**9)
         client.say("/tracks", encode_tracks(later))
         client.wait("/report", 2)
-        assert decode_fit(client.heard["/fit"][-1])[0] == later.start_ns
+        assert stamp_of(client.heard["/fit"][-1], "fit") == later.start_ns
         assert {
             node: peak
             for node, pid in made.pids.items()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from support.suite_processes import Client, whole_chain
 
+from msg_conventions import trajectory
 from msg_conventions.diagnostics import decode_diagnostics
-from msg_conventions.fits import decode_fit
 from msg_conventions.roads import decode_map
 from scenario_gen.bags.storage.bag import read_messages
 
@@ -89,14 +89,15 @@ def test_plans_are_served_or_refused(suite, client):
     from nav_msgs.srv import GetPlan
 
     client.hear("/diagnostics", "/fit")
-    asked = decode_fit(client.wait("/fit")[0])[2]
+    fit = trajectory.decode(client.wait("/fit")[0], "fit")
+    start, goal = np.dstack([fit.position, fit.heading])[0, [0, -1]]
     request = GetPlan.Request()
     request.start.header.frame_id, request.start.header.stamp.sec = "map", 123
-    request.start.pose.position.x, request.start.pose.position.y = asked.start[0, :2]
-    request.goal.pose.position.x, request.goal.pose.position.y = asked.end[0, :2]
-    for end, state in ((request.start, asked.start), (request.goal, asked.end)):
+    request.start.pose.position.x, request.start.pose.position.y = start[:2]
+    request.goal.pose.position.x, request.goal.pose.position.y = goal[:2]
+    for end, state in ((request.start, start), (request.goal, goal)):
         turn = end.pose.orientation
-        turn.z, turn.w = np.sin(0.5 * state[0, 2]), np.cos(0.5 * state[0, 2])
+        turn.z, turn.w = np.sin(0.5 * state[2]), np.cos(0.5 * state[2])
     plan = client.call(GetPlan, "/planner/get_plan", request).plan
     assert len(plan.poses) >= 2
     assert plan.header.stamp.sec == 123

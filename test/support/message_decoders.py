@@ -27,5 +27,5 @@ def decode_state(data: bytes, source: str = "state") -> tuple[int, str, str, Flo
     Raises:
         InputError: the message is damaged, or a value is not finite.
     """
-    stamp_ns, frame_id, child, state = decode_odometry(data, source, framed=True)
+    stamp_ns, frame_id, child, state = decode_odometry(data, source)
     return stamp_ns, frame_id, child, state[:4]

@@ -16,6 +16,7 @@ import re
 
 import numpy as np
 
+from msg_conventions import documents
 from msg_conventions.cdr import stamp_of
 from msg_conventions.changepoints import (
     decode_changepoints,
@@ -29,7 +30,6 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import messages_of
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.recordings.former import upgraded
 from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
 from scenario_gen.bags.recordings.template import template_statuses
 from scenario_gen.bags.storage.bag import naming_bag, read_messages
@@ -67,7 +67,7 @@ _TEMPLATE_TOPICS = (
     r"tracks|changepoints|map|fit(?:/info)?|road/(?:entries|exits|lanes)|vehicle_\w+/route"
     r"|ego/(?:start|goal)"
 )
-_OTHER_TOPICS = "posterior|road/info|ego/witness|scenarios|scenarios/info|diagnostics"
+_OTHER_TOPICS = "posterior|ego/witness|scenarios|scenarios/info|diagnostics"
 _TEMPLATE_TOPIC = re.compile(_TEMPLATE_TOPICS, re.DOTALL)
 _TOPIC = re.compile(
     rf"(?:(?P<namespace>.*?)/)?(?P<topic>{_TEMPLATE_TOPICS}|{_OTHER_TOPICS})", re.DOTALL
@@ -132,6 +132,7 @@ def read_recording(
     for message in read_messages(path, lambda name: parsed(name) is not None, config):
         match = parsed(message.topic)
         if match:
+            _refuse_draft(path, match["topic"], message.type)
             by_topic = messages.setdefault(match["namespace"] or "", {})
             by_topic.setdefault(match["topic"], []).append(message)
     # /diagnostics is one topic for the nodes of all namespaces.
@@ -142,6 +143,15 @@ def read_recording(
         for name, by_topic in sorted(messages.items())
     }
     return Recording(path, namespaces)
+
+
+def _refuse_draft(path: Path, topic: str, kind: str) -> None:
+    """Raise InputError if a message has the type that drafts of the conventions gave its topic."""
+    if topic in (*DOCUMENTS, INFO) and kind != documents.TYPE:
+        raise InputError(
+            f"{path}: written by a draft of scenario_gen: {topic} is a {kind}; generate it again "
+            f"from its tracks: `scenario-gen generate {path}`"
+        )
 
 
 class Namespace(RecordedScenarios):
@@ -163,7 +173,6 @@ class Namespace(RecordedScenarios):
         self._shared = shared
         self._roads = roads
         super().__init__(path, name, messages)
-        self._recorded = upgraded(messages, self._statuses_of)
 
     # The template and the road of one scenario.
 
@@ -313,10 +322,7 @@ class Namespace(RecordedScenarios):
     @cached_property
     def statuses(self) -> Statuses:
         """The newest diagnostics about the newest template."""
-        return self._statuses_of(self.encounter.start_ns)
-
-    def _statuses_of(self, stamp_ns: int) -> Statuses:
-        """Return the newest diagnostics about the template with a stamp."""
+        stamp_ns = self.encounter.start_ns
         data = (message.data for message in self._recorded.get("diagnostics", ()))
         shared = template_statuses(self._shared, stamp_ns, f"{self.name}/")
         return shared | template_statuses(data, stamp_ns)

@@ -19,7 +19,7 @@ from msg_conventions import trajectory
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
 from msg_conventions.documents import DOCUMENTS, hash_of, head_of, LANES, PLAN
-from msg_conventions.fits import decode_fit, decode_plan
+from msg_conventions.fits import decode_plan
 from msg_conventions.roads import decode_description, decode_map
 from msg_conventions.topics import LATCHED, topic_entry
 from msg_conventions.tracks import decode_tracks
@@ -58,7 +58,6 @@ DECODERS: dict[str, Callable[[bytes, str], object]] = {
     "map": lambda data, topic: decode_map(data, name=topic),
     LANES: decode_description,
     "changepoints": trajectory.decode,
-    "fit": decode_fit,
     PLAN: decode_plan,
 }
 

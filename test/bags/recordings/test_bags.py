@@ -19,12 +19,15 @@ from rosbags.typesys import get_typestore, Stores
 from support.bag_examples import hand_made_run
 import yaml
 
+from msg_conventions.scenario_info import INFO
 from msg_conventions.scenarios import messages_of
+from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import load, read_recording, read_scenario_set
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import bag_topics, bag_warnings, read_messages
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.types.generation import GenerationResult
 
@@ -256,3 +259,17 @@ def test_folder_without_result_is_refused(run, tmp_path):
         load(folder)
     with pytest.raises(InputError, match="no namespace has; is it a log"):
         load(bundled("a"))
+
+
+def test_bag_of_draft_names_its_remedy(run, tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        for topic, data, stamp in result_messages(run):
+            kind = (
+                "diagnostic_msgs/msg/DiagnosticArray" if topic == INFO else topic_entry(topic)[0]
+            )
+            bag.add_topic(f"/{topic}", kind)
+            bag.write(f"/{topic}", data, stamp)
+    with pytest.raises(InputError, match=r"draft.*`scenario-gen generate .*bag`"):
+        load(tmp_path / "bag")
+    (again,) = read_log(tmp_path / "bag").encounters
+    assert np.array_equal(again.position, run.encounter.position)
