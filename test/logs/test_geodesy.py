@@ -17,6 +17,7 @@ from scenario_gen.logs.geodesy import (
     metres_per_degree,
     middle_of,
     sites_of,
+    utm,
 )
 
 GLOBE = pyproj.Geod(ellps="WGS84")
@@ -131,3 +132,25 @@ def test_there_and_back():
         assert found == pytest.approx(
             np.array([[0.0, 0.001 * north], [0.001 * east, 0.0]]), abs=0.01
         )
+
+
+@pytest.mark.parametrize(
+    ("place", "zone"),
+    [
+        ((48.1, 11.5), "32 north"), ((60.4, 5.3), "32 north"), ((55.9, 5.3), "31 north"),
+        ((64.1, 5.3), "31 north"), ((60.4, 12.1), "33 north"), ((-33.9, 151.2), "56 south"),
+        ((0.0, -180.0), "1 north"), ((10.0, 179.9), "60 north"), ((42.3, -83.7), "17 north"),
+    ],
+)  # fmt: skip
+def test_utm_zone_is_that_of_place(place, zone):
+    """In its own zone a place is within 3.5° of the central meridian, at 500 km east; Norway's is wider."""
+    projection, name = utm(place)
+    assert name == f"UTM zone {zone}"
+    east, _ = projection(place[1], place[0])
+    assert abs(east - 500_000.0) < 400_000.0
+    assert projection(place[1], place[0]) == pytest.approx(
+        pyproj.Proj(f"EPSG:{327 if 'south' in zone else 326}{zone.split()[0]:>02}")(
+            place[1], place[0]
+        ),
+        abs=1e-3,
+    )

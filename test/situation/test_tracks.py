@@ -15,7 +15,7 @@ from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.situation import abreast_in_lane, Equation, path_crossing, solve_placement
 from scenario_gen.situation.frenet import _extended, to_frenet
 from scenario_gen.situation.separation import separate, smallest_gaps
-from scenario_gen.situation.tracks import clean_tracks
+from scenario_gen.situation.tracks import clean_tracks, is_same_turn, manoeuvre_of
 from scenario_gen.types import Encounter, Vehicle
 
 
@@ -255,3 +255,45 @@ def test_bicycle_beside_car_shares_its_lane(beside, width, count):
         assert one.offset == pytest.approx(beside, abs=0.01)
         assert one.clearance == pytest.approx(abs(beside) - 0.95 - 0.3, abs=0.01)
         assert one.spans == pytest.approx(np.array([[10.0, 49.5], [0.0, 39.5]]), abs=0.6)
+
+
+@pytest.mark.parametrize("off", [-0.02, 0.02])
+def test_headings_about_west_stay_together(off):
+    """A drive to the west, of which the path is beyond ±π and the recorded heading is not."""
+    recorded = line(0.0, 0.0, np.pi - off, 8.0)
+    recorded[:, 2] = np.sign(off) * np.pi + off
+    encounter = encounter_of(recorded, line(0.0, 60.0, 0.0, 5.0))
+    track, _ = clean_tracks(encounter)
+    np.testing.assert_allclose(track.poses[:, 2], encounter.heading[0], atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("recorded", "turn", "same"),
+    [
+        (0, 14, True),
+        (20, 34, True),
+        (20, 36, False),
+        (45, 84, True),
+        (45, 86, False),
+        (-45, 45, False),
+    ],
+)
+def test_turns_are_compared_by_name(recorded, turn, same):
+    """Up to 15° they are the same, up to 40° if they are named the same."""
+    recorded, turn = np.radians([recorded, turn])
+    assert is_same_turn(recorded, turn) == is_same_turn(turn, recorded) == same
+
+
+@pytest.mark.parametrize(
+    ("turn", "name"),
+    [
+        (29, "straight"),
+        (-29, "straight"),
+        (31, "left"),
+        (-31, "right"),
+        (149, "left"),
+        (-151, "U-turn"),
+    ],
+)
+def test_manoeuvres_are_named_by_turn(turn, name):
+    assert manoeuvre_of(np.radians(turn)) == name

@@ -39,7 +39,7 @@ OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast
 COMPARISONS = {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt}
 TEXTUAL = (ast.JoinedStr, ast.arg, ast.AnnAssign, ast.Subscript, ast.Raise)
 SYMMETRIC = {  # functions of which the first two arguments may be swapped
-    "_is_same", "_wasserstein", "allclose", "box_distance", "feature_extents", "hypot", "is_same_turn",
+    "_is_same", "_paths_cross", "_wasserstein", "allclose", "box_distance", "feature_extents", "hypot", "is_same_turn",
     "jensen_shannon", "present_slice",
 }  # fmt: skip
 EQUIVALENT = {  # (file, mutant): the reason why no test can fail

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.method.evaluation import coverage_of
+from scenario_gen.method.evaluation.measures import measure
 from scenario_gen.types import (
     Encounter,
     Facts,
@@ -76,3 +77,21 @@ def test_order_outcomes_are_counted(template):
     ]
     assert coverage_of(template, named).orders == {str(kept): 2, str(swapped): 1}
     assert coverage_of(template, []).picks == {}
+
+
+@pytest.mark.parametrize("behind", [8.0, 20.0, 35.0])
+def test_centres_close_as_first_enters(behind):
+    """The first one's front is 1 m before the other's path when its centre is 3 m before it, after 2.7 s."""
+    a, b = 3.0, 3.0 + behind
+    assert measure(crossing(behind), "closing_speed") == pytest.approx(
+        10.0 * (a + b) / np.hypot(a, b), rel=1e-3
+    )
+
+
+def test_parallel_drives_close_at_their_fastest():
+    """Both drive east, one from 30 m behind at 14 m/s until it brakes to 8 m/s."""
+    speed = np.stack([np.full(101, 10.0), np.where(TIME < 5.0, 14.0, 8.0)])
+    x = np.cumsum(0.1 * speed, axis=1) + np.array([[30.0], [0.0]])
+    position = np.stack([x, np.full(x.shape, 0.0)], axis=-1)
+    drive = Scenario(crossing(8.0).vehicles, TIME, position, 0.0 * x, speed, 0.0 * x, 0, 0)
+    assert measure(drive, "closing_speed") == pytest.approx(4.0)
