@@ -32,6 +32,14 @@ SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3
 ROADS = ("straight", "t_intersection")
 """The paper's roads (IV-B), in the order in which they are tried: a road along which, else a junction."""
 SIDE, HALF_ROAD, VERGE = 1000.0, 100.0, 20.0
+PAPER = RoadConfig(
+    lanes=1,
+    lane_width=HALF_ROAD,
+    corner_radius=HALF_ROAD / 2.0,
+    resolution=1.0,
+    arm_length=SIDE / 2.0,
+)
+"""Of the paper's roads (IV-B): 1000 cells from end to end, lengths in cells."""
 """Cells: side of the grid, half the width of a road, room kept to the grid's edge."""
 TRAINING_PERIOD = 1.0
 """Seconds between the training points on the planned path."""
@@ -87,7 +95,7 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
         except RefusedError as error:
             reasons.append(f"{name}: {error}")
             continue
-        road = build_road(name, encounter, RoadConfig(paper=True))
+        road = build_road(name, None, PAPER)
         try:
             return road, *_evenly_scaled(
                 encounter, segmentation, road, _Lanes.of(road, metric, fit)

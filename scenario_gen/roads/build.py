@@ -3,6 +3,7 @@
 
 """Roads by name or path: built-in, drawn around a recording, or read from a map."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -21,7 +22,7 @@ from scenario_gen.roads.lights import LIT
 from scenario_gen.roads.obstacles import parked_cars, read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.pavement import ARM_COUNT
-from scenario_gen.roads.shaped import draw_along, draw_merge, draw_paper, fitting_width, main_shape
+from scenario_gen.roads.shaped import draw_along, draw_merge, fitting_width, main_shape
 from scenario_gen.roads.vector.place import windows_on_lanes
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
 from scenario_gen.situation import (
@@ -116,17 +117,17 @@ def road_and_template(
     return replace(road, lanes=replace(road.lanes, notes=(note, *road.lanes.notes))), other
 
 
-def windows_on_map(name_or_path: Road | Path | str, encounter: Encounter) -> list[Floats]:
-    """Return windows (N, 2) [s] in which a recording is on lanes of a map, the best place first.
+def windows_on_map(name_or_path: Road | Path | str, encounter: Encounter) -> Iterator[Floats]:
+    """Yield windows (N, 2) [s] in which a recording is on lanes of a map, the best place first.
 
     There are none for another road, and where the lanes are long enough.
     """
     network = None if isinstance(name_or_path, Road) else _vector_network(str(name_or_path))
     if network is None:
-        return []
+        return
     if _drives_on_other_side(encounter, network):
         encounter = mirrored(encounter)
-    return windows_on_lanes(network, Situation.of(encounter).tracks)
+    yield from windows_on_lanes(network, Situation.of(encounter).tracks)
 
 
 def _vector_network(name: str) -> LaneNetwork | None:
@@ -160,8 +161,6 @@ class DrawRoad(Protocol):
 def _road_without_obstacles(
     name_or_path: str, encounter: Encounter | None, config: RoadConfig
 ) -> Road:
-    if config.paper and name_or_path in BUILT_IN:
-        return draw_paper(name_or_path, config)
     if is_vector_map(name_or_path):
         tracks = None if encounter is None else Situation.of(encounter).tracks
         return vector_road(name_or_path, tracks, config)

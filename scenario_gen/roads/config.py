@@ -68,11 +68,6 @@ class RoadConfig(Parameters):
     corridor_run_out: float = parameter(
         6.0, "length of a corridor beyond a path's ends", unit="m", low=1.0, high=50.0
     )
-    paper: bool = parameter(
-        False,
-        "straight and t_intersection as in the paper: a grid of 1000 x 1000 cells, lengths in "
-        "cells",
-    )
     max_cells: int = parameter(
         25_000_000,
         "most cells of a drawn road, or pixels of a map",
@@ -94,11 +89,6 @@ class RoadConfig(Parameters):
         read_obstacles(self.obstacles)
         if 0.0 < self.cycle_lane < 1.0:
             raise InputError(f"road.cycle_lane {self.cycle_lane:g} m; choose 0 or at least 1 m")
-        if self.paper and (self.cycle_lane or self.crossing != "none"):
-            raise InputError(
-                "road.paper: the paper's roads have no crossings and no cycle lanes; unset "
-                "road.crossing and road.cycle_lane"
-            )
 
 
 def refuse_too_many_cells(name: str, width: int, height: int, config: RoadConfig) -> None:

@@ -45,15 +45,13 @@ _MAX_CYCLIST_CURVATURE_PER_M = 0.35
 _RING_MARGIN_M = 0.5  # on each side of a roundabout's lane
 
 
-def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = None) -> Road:
-    """Return a road with its lanes and the grid of its paved ground.
+def draw_plan(plan: Plan, name: str, config: RoadConfig) -> Road:
+    """Return a road with its lanes and the grid of its paved ground and a verge.
 
     Args:
         plan: its arms, in metres.
         name: of the road.
         config: lane width, resolution, traffic side, corner radius.
-        box: (2, 2) [m] lowest and highest x, y of the grid, of which the lowest become 0; None:
-            the whole road and a verge.
 
     Raises:
         RefusedError: it has more cells than are allowed, or cannot have cycle lanes.
@@ -71,13 +69,12 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
         drawn=True,
         drawn_for=plan.drawn_for,
     ).with_lanes((*drawing.lanes, *other_lanes))
-    if box is None:
-        outlines = [shapely.MultiPoint(lane.outline) for lane in other_lanes]
-        box = np.reshape(shapely.total_bounds([drawing.surface, *outlines]), (2, 2))
-        kerb = plan.arms[0].inward * config.lane_width  # lies on the edges of cells
-        beyond = (VERGE_M - box[0] - kerb) / config.resolution
-        box[1] += VERGE_M
-        box[0] = -kerb - config.resolution * np.ceil(beyond - 1e-6)
+    outlines = [shapely.MultiPoint(lane.outline) for lane in other_lanes]
+    box = np.reshape(shapely.total_bounds([drawing.surface, *outlines]), (2, 2))
+    kerb = plan.arms[0].inward * config.lane_width  # lies on the edges of cells
+    beyond = (VERGE_M - box[0] - kerb) / config.resolution
+    box[1] += VERGE_M
+    box[0] = -kerb - config.resolution * np.ceil(beyond - 1e-6)
     low = box[0]
     surface = shapely.transform(drawing.surface, lambda points: points - low)
     return draw_lanes(network.moved(-low), surface, config, box - low)

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place, unit
@@ -76,9 +75,7 @@ def _straight(length: float) -> Curve:
     return Curve(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
 
 
-def draw_along(
-    name: str, shape: Curve, lanes: int, config: RoadConfig, box: Floats | None = None
-) -> Road:
+def draw_along(name: str, shape: Curve, lanes: int, config: RoadConfig) -> Road:
     """Draw a road along a line, with side arms at right angles in the middle.
 
     Args:
@@ -86,7 +83,6 @@ def draw_along(
         shape: the line on which vehicles drive.
         lanes: per direction of the main road.
         config: how it is drawn.
-        box: (2, 2) [m] of the grid about the middle, as in `draw_plan`.
 
     Raises:
         RefusedError: it has more cells than are allowed.
@@ -94,7 +90,7 @@ def draw_along(
     line = _main_axis(name, shape, config)
     sides = SIDE_ARM_YAWS_RAD[: ARM_COUNT[name] - 2]
     if not sides:
-        return draw_plan(Plan([Arm(line, lanes, lanes)]), name, config, box)
+        return draw_plan(Plan([Arm(line, lanes, lanes)]), name, config)
     half = lanes * config.lane_width
     reach = np.ceil(max(config.arm_length or half + MIN_ARM_M, _least_arm(lanes, config)))
     yaw = float(line.at(line.length / 2.0)[2])
@@ -103,7 +99,7 @@ def draw_along(
         for half_way in (line, line.reversed())
     ]
     arms += [Arm.towards(yaw + side, reach, config.lanes or 1) for side in sides]
-    return draw_plan(Plan(arms), name, config, box)
+    return draw_plan(Plan(arms), name, config)
 
 
 def _least_arm(lanes: int, config: RoadConfig) -> float:
@@ -123,21 +119,6 @@ def _main_axis(name: str, shape: Curve, config: RoadConfig) -> Curve:
     half = config.arm_length or max(middle + END_ROOM_M, MIN_ARM_M)
     line = shape.cut(middle - half, middle + half, 0.25)
     return Curve(line.points - np.array([*line.at(half)[:2], 0.0]))
-
-
-def draw_paper(name: str, config: RoadConfig) -> Road:
-    """Draw the paper's straight lane or T-intersection (IV-B).
-
-    It has 1000 x 1000 cells and one wide lane per direction; lengths are in cells.
-
-    Raises:
-        InputError: the road has no paper version.
-    """
-    if name not in ("straight", "t_intersection"):
-        raise InputError(f"road {name} has no paper version; choose straight or t_intersection")
-    cells = replace(config, lane_width=100.0, corner_radius=50.0, resolution=1.0, arm_length=500.0)
-    shape, _ = main_shape(name, (), cells)
-    return draw_along(name, shape, 1, cells, np.array([[-500.0, -500.0], [500.0, 500.0]]))
 
 
 def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:

@@ -27,7 +27,7 @@ def case():
 def test_paper_grid_and_ends_are_used(case):
     assert (
         case.road.name == "t_intersection"
-        and case.road.drivable.shape == (1000, 1000)
+        and np.count_nonzero(case.road.drivable.any(axis=0)) == 1000
         and case.road.resolution == 1.0
     )
     for arm in case.arms.values():

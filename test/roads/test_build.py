@@ -60,20 +60,11 @@ def test_resolution_and_arm_length_are_kept():
     assert road.drivable.sum(axis=0).max() == 70  # 2 x 3.5 m in cells
 
 
-@pytest.mark.parametrize("name", ["straight", "t_intersection"])
-def test_paper_roads_have_1000_cells(name):
-    road = build_road(name, None, RoadConfig(paper=True))
-    assert road.drivable.shape == (1000, 1000)
-    assert road.resolution == 1.0
-
-
 def test_unknown_and_impossible_roads_are_named():
     with pytest.raises(InputError, match="motorway"):
         build_road("motorway", None)
     with pytest.raises(InputError, match="corridor"):
         build_road("corridor", None)
-    with pytest.raises(InputError, match="four_way"):
-        build_road("four_way", None, RoadConfig(paper=True))
 
 
 @pytest.mark.parametrize("path", LOGS)

@@ -15,10 +15,9 @@ from scenario_gen.types import Vehicle
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-@pytest.mark.parametrize("name", [*BUILT_IN, "paper"])
+@pytest.mark.parametrize("name", BUILT_IN)
 def test_road_is_its_lanes_in_messages(name, side):
-    config = RoadConfig(lanes=2, traffic_side=side, paper=name == "paper")
-    road = build_road("t_intersection" if name == "paper" else name, None, config)
+    road = build_road(name, None, RoadConfig(lanes=2, traffic_side=side))
     network = road.lanes
     for k in (*network.entries, *network.exits):
         assert not network.lanes[k].junction  # traffic comes and goes by arms alone
@@ -121,8 +120,6 @@ def test_roads_without_cycle_lanes_refuse_them():
             build_road(name, None, RoadConfig(cycle_lane=1.5))
     with pytest.raises(InputError, match=r"road\.cycle_lane 0\.5 m; choose 0 or at least 1 m"):
         RoadConfig(cycle_lane=0.5)
-    with pytest.raises(InputError, match=r"road\.paper: .* no crossings and no cycle lanes"):
-        RoadConfig(paper=True, crossing="zebra")
 
 
 def test_junction_ends_near_its_corners():

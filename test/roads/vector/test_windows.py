@@ -22,10 +22,10 @@ def test_windows_end_where_lanes_do(tmp_path, suffix):
     vehicles = (Vehicle("1", LENGTH_M, 1.8), Vehicle("2", LENGTH_M, 1.8))
     encounter = Encounter.sampled(vehicles, DT, position, heading, speed, "long")
     path = write(tmp_path, suffix)
-    best = windows_on_map(str(path), encounter)[0]
+    best = next(windows_on_map(str(path), encounter))
     reach = ARM - LENGTH_M / 2.0 - 1.0
     ends = (np.array([-reach, reach]) - BEGIN_M) / SPEED_MPS
     assert best == pytest.approx(np.tile(ends, (2, 1)), abs=0.15)
-    assert not windows_on_map("four_way", encounter)
+    assert not list(windows_on_map("four_way", encounter))
     short = encounter.select((0, 1), 40, 140)
     assert all(np.ptp(each, axis=1).max() < short.duration for each in windows_on_map(path, short))
