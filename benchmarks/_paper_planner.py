@@ -104,7 +104,7 @@ class RrtStarConnect:
         """Return the search of a query before it grows; it samples from a component's cells."""
         config, road = self.config, space.road
         ends = to_cells(road, np.array((query.start, query.goal))).tolist()
-        cells, _ = free_cells(space, label)
+        cells = free_cells(space, label)
         least_gamma = 2.0 * math.sqrt(1.5 * max(len(cells), 1) / math.pi)  # of eq 10, d = 2
         rules = Rules(
             cells=cells,
@@ -170,7 +170,16 @@ def straight_path(search: Search) -> Floats:
 
 def _corner_poses(space: FreeSpace, label: int) -> Floats:
     """Return poses (c, 3) [cells] in front of convex corners of obstacles, where paths bend."""
-    _, corners = free_cells(space, label)
+    inside = np.pad(space.labels == label, 1)
+    rows, columns = space.labels.shape
+    corner = np.zeros((rows, columns), dtype=np.bool_)
+    for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):
+        # The diagonal neighbour is closed, the two cells between are open.
+        diagonal = inside[di : di + rows, dj : dj + columns]
+        in_row = inside[1:-1, dj : dj + columns]
+        in_column = inside[di : di + rows, 1:-1]
+        corner |= ~diagonal & in_row & in_column
+    corners = np.flatnonzero(corner & inside[1:-1, 1:-1])
     row, column = np.divmod(corners, space.road.drivable.shape[1])
     return np.column_stack((column + 0.5, row + 0.5, np.zeros(len(corners))))
 

@@ -189,19 +189,15 @@ def _near_squares_free(
 
 
 @kernel(F2, F, F, F, F, F, on_demand=True)
-def free_length(
+def segment_free(
     clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
-) -> float:
-    """Return how far a disc can move from a towards b.
+) -> bool:
+    """Return whether a disc can move from a to b, exactly.
 
     The clearance field (H, W) skips what is surely free; where it does not suffice, the squares
     themselves are checked.
 
     Source: sphere tracing (Hart 1996).
-
-    Returns:
-        Infinity if the whole segment is free, which is exact; otherwise a length that is surely
-        free, short of the true one by at most a cell.
     """
     height, width = clearance.shape
     dx, dy = bx - ax, by - ay
@@ -213,27 +209,19 @@ def free_length(
         x, y = ax + t * dx, ay + t * dy
         i, j = int(np.floor(y)), int(np.floor(x))
         if i < 0 or j < 0 or i >= height or j >= width:
-            return t
+            return False
         at_centre = clearance[i, j]
         if at_centre == 0.0 or at_centre + _HALF_DIAGONAL_CELLS <= radius:
-            return t
+            return False
         ex, ey = x - j - 0.5, y - i - 0.5
         room = at_centre - np.sqrt(ex * ex + ey * ey) - radius  # a free ball about (x, y)
         if room < 0.5:
             room = min(1.0, length - t)
             if not _near_squares_free(clearance, x, y, x + room * dx, y + room * dy, radius):
-                return t
+                return False
         t += room
         if t >= length:
-            return np.inf
-
-
-@kernel(F2, F, F, F, F, F, on_demand=True)
-def segment_free(
-    clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
-) -> bool:
-    """Return whether a disc can move from a to b, exactly."""
-    return free_length(clearance, ax, ay, bx, by, radius) == np.inf
+            return True
 
 
 @kernel(F2, F2, F2, F, OUTB1, on_demand=True)

@@ -81,21 +81,6 @@ def free_space(road: Road, radius: float) -> FreeSpace:
 
 
 @lru_cache(maxsize=4)
-def free_cells(space: FreeSpace, label: int) -> tuple[Ints, Ints]:
-    """Return the flat indices of the cells in one component, ascending; queries in it share them.
-
-    Returns:
-        All of them (n,), and those (c,) that lie diagonally before a convex corner of the space
-        that the disc cannot enter.
-    """
-    inside = np.pad(space.labels == label, 1)
-    rows, columns = space.road.drivable.shape
-    corner = np.zeros((rows, columns), dtype=np.bool_)
-    for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):
-        # The diagonal neighbour is closed, the two cells between are open.
-        diagonal = inside[di : di + rows, dj : dj + columns]
-        in_row = inside[1:-1, dj : dj + columns]
-        in_column = inside[di : di + rows, 1:-1]
-        corner |= ~diagonal & in_row & in_column
-    corner &= inside[1:-1, 1:-1]
-    return sealed(np.flatnonzero(inside[1:-1, 1:-1])), sealed(np.flatnonzero(corner))
+def free_cells(space: FreeSpace, label: int) -> Ints:
+    """Return the flat indices (n,) of the cells in one component, ascending."""
+    return sealed(np.flatnonzero(space.labels == label))

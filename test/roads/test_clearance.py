@@ -142,8 +142,8 @@ def test_free_space_is_cached_per_radius():
     divided = road_of(drivable)
     assert free_space(open_road, 0.4) is free_space(open_road, 0.4)
     assert [free_space(road, 0.4).labels.max() for road in (open_road, divided)] == [1, 2]
-    assert len(free_cells(free_space(open_road, 2.4), 1)[0]) == 5 * 16
-    assert len(free_cells(free_space(open_road, 0.4), 1)[0]) == 9 * 20
+    assert len(free_cells(free_space(open_road, 2.4), 1)) == 5 * 16
+    assert len(free_cells(free_space(open_road, 0.4), 1)) == 9 * 20
 
 
 @settings(max_examples=60)

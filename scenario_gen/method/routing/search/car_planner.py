@@ -242,7 +242,7 @@ def _disc_path(
         label = _component(road, query, radius)
         if label is None:
             continue
-        inside, _ = free_cells(free_space(road, radius), label)
+        inside = free_cells(free_space(road, radius), label)
         cells = inside if label and len(inside) else everywhere
         straight = rules._replace(cells=inside, near=NO_POSES, step=DISC_STEP_CELLS)
         search = Search(road, disc_scene(road, radius), straight, (start, goal), seed)
