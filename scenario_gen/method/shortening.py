@@ -4,10 +4,10 @@
 """A recording that is too long for a road is shortened to its interaction, as little as possible.
 
 Each vehicle's track may lose its begin and its end, as long as all conflicts, orders, reactions,
-waits and turns remain (`interaction_windows`). On a map it is cut to where the lanes reach. Else
-the shortest parts tell whether shortening helps; then longer ones are tried, the one with the
-smallest loss first: the same time for all vehicles, in quarters; then a time for each, likewise;
-and at last the beginning of a braking may be lost.
+waits and turns remain (`interaction_windows`). The shortest parts tell whether shortening helps;
+in one of them the beginning of a braking may be lost. Then longer ones are tried: on a map where
+the lanes reach; else the one with the smallest loss first, the same time for all vehicles, in
+quarters, then a time for each, likewise.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -42,7 +42,7 @@ def fitting_part(
     encounter: Encounter,
     refusal: RefusedError,
     config: FittingConfig = FittingConfig(),
-    windows: Sequence[Floats] = (),
+    windows: Iterable[Floats] = (),
 ) -> tuple[Encounter, Made, Note]:
     """Return the part of a recording that fits with the smallest loss, and a note on it.
 
@@ -104,19 +104,18 @@ class _Search(Generic[Made]):
     attempt: Callable[[Encounter], Made]
     situation: Situation
     config: FittingConfig
-    refusals: list[tuple[Encounter, RefusedError]] = field(default_factory=list)
+    refusals: list[Encounter] = field(default_factory=list)
     made: list[Made] = field(default_factory=list)
 
-    def shortest_loss(self, windows: Sequence[Floats]) -> Encounter | None:
+    def shortest_loss(self, windows: Iterable[Floats]) -> Encounter | None:
         """Return the recording with the smallest loss found; None if it does not fit shortened."""
         ways = list(self._ways())
-        proposed = islice(self._proposed(windows, ways[-2:]), _PROPOSED_COUNT)
-        if best := self._first_fitting(proposed):
-            return best
         tightest = self._first_fitting(ways[-_TIGHTEST_COUNT:])
         if tightest is None:  # the others are longer
             return None
-        return self._first_fitting(ways[:-_TIGHTEST_COUNT]) or tightest
+        proposed = islice(self._proposed(windows, ways[-2:]), _PROPOSED_COUNT)
+        longer = chain(proposed, ways[:-_TIGHTEST_COUNT])
+        return self._first_fitting(longer) or tightest
 
     def _first_fitting(self, ways: Iterable[_Way]) -> Encounter | None:
         return next(filter(None, map(self._fitting, ways)), None)
@@ -141,12 +140,12 @@ class _Search(Generic[Made]):
             if new and shortens and self._part(way) is not None:
                 yield way
 
-    def _proposed(self, windows: Sequence[Floats], needed: Sequence[_Way]) -> Iterator[_Way]:
+    def _proposed(self, windows: Iterable[Floats], needed: Sequence[_Way]) -> Iterator[_Way]:
         """Yield the windows that contain what is needed, if possible the same for all vehicles."""
-        common = [
-            np.tile((each[:, 0].max(), each[:, 1].min()), (len(each), 1)) for each in windows
+        pairs = [
+            (np.tile((each[:, 0].max(), each[:, 1].min()), (len(each), 1)), each)
+            for each in windows
         ]
-        pairs = list(zip(common, windows, strict=True))
         for way, proposed in product(needed, chain.from_iterable(pairs)):
             if ((way.windows - proposed) * (1.0, -1.0)).min() >= 0.0:
                 yield _Way(proposed, way.whole_braking)
@@ -154,7 +153,7 @@ class _Search(Generic[Made]):
     def add_remedy(self, refusal: RefusedError) -> None:
         """Add to a refusal the lanes that the shortest form of the recording needs."""
         whole = self.situation.encounter
-        part, error = self.refusals[-1] if self.refusals else (whole, refusal)
+        part = self.refusals[-1] if self.refusals else whole
         needed = [
             f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))} within "
             f"{track.travelled:.0f} m"
@@ -162,15 +161,14 @@ class _Search(Generic[Made]):
             if not track.still
         ]
         if len(needed) > 3:
-            needed[3:] = [f"{len(needed) - 3} more vehicles drive"]
+            needed[3:] = [f"and {len(needed) - 3} more"]
         form = "It needs a road on which "
         if whole.duration - part.duration >= MIN_LOSS_S:
             begin = (part.start_ns - whole.start_ns) * 1e-9
             used = f"{begin:.1f} to {begin + part.duration:.1f} s of {whole.duration:.1f} s"
             form = f"Shortened to its interaction ({used}), it needs a road on which "
-        other = "" if type(error) is type(refusal) else f": {error}"
         hint = "" if self.refusals else "; log.start and log.end choose a part of it"
-        refusal.args = (f"{refusal}. {form}{' and '.join(needed)}{other}{hint}",)
+        refusal.args = (f"{refusal}. {form}{', '.join(needed)}{hint}",)
 
     def lost_braking(self, part: Encounter) -> str:
         """Return which vehicles begin to brake before their part begins, for the note on it."""
@@ -199,7 +197,7 @@ class _Search(Generic[Made]):
             return None
         try:
             self.made.append(self.attempt(part))
-        except RefusedError as error:
-            self.refusals.append((part, error))
+        except RefusedError:
+            self.refusals.append(part)
             return None
         return part

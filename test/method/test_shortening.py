@@ -147,3 +147,13 @@ def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:
     lost = windows.copy()
     lost[:, 1] = situation.conflicts[0].entry_first - 1.0
     assert not keeps_interaction(situation, Situation.of(cut(crossing, lost)))
+
+
+def test_recorded_platoon_fits_a_straight(data: Path) -> None:
+    (log,) = (data / "trajectories" / "openacc_zalazone").glob("encounter_3plus*")
+    (platoon,) = read_log(log).encounters
+    generation = Generation("straight", PipelineConfig(), Request(), 7)
+    with pytest.raises(RefusedError, match="nowhere this encounter fits unchanged") as caught:
+        generation.plan(platoon)
+    part, _, note = fitting_part(generation.plan, platoon, caught.value)
+    assert part.ids == platoon.ids and note.kind is NoteKind.SHORTENED

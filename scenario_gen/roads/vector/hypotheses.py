@@ -311,7 +311,8 @@ def _stretches(
     fixed = 2.0 * room + _ROUNDING_M
     shape = main_line(frenet, tracks).shape
     yaw = shape.at(np.arange(room - _END_ROOM_M, high - low - room, 1.0))[:, 2]
-    longest, stretches = 0.0, []
+    longest = 0.0
+    stretches: list[list[_Stretch]] = []
     for first in range(len(graph.network.lanes)) if lanes is None else lanes:
         chain = _straight_chain(graph, first, needed)
         curve = graph.curve(chain)
@@ -320,30 +321,32 @@ def _stretches(
         if curve.length >= needed:
             scale = 1.0
         if scale >= min_scale:
-            stretches.append(_best_stretch(chain, curve, yaw, scale, room))
+            stretches.append(_best_stretches(chain, curve, yaw, scale, room))
     if not stretches:
         scale = (longest - fixed) / (needed - fixed)
         raise RefusedError(
             f"the recording is {high - low:.0f} m long, the longest road {longest:.0f} m: it "
             f"would need scale {max(scale, 0.0):.2f}; at least {min_scale:g} is accepted"
         )
-    stretches.sort(key=lambda stretch: (round(stretch.bend, 4), stretch.chain))
-    return stretches[:_TRIED_STREETS_COUNT]
+    stretches.sort(key=lambda alike: (round(alike[0].bend, 4), alike[0].chain))
+    return [each for alike in stretches[:_TRIED_STREETS_COUNT] for each in alike]
 
 
-def _best_stretch(
+def _best_stretches(
     chain: LaneChain, curve: Curve, yaw: Floats, scale: float, room: float
-) -> _Stretch:
-    """Return the stretch of a chain that bends most like a line with yaws (S,) every metre.
+) -> list[_Stretch]:
+    """Return the stretches of a chain that bend most like a line with yaws (S,) every metre.
 
-    It leaves some room [m] at both ends.
+    They leave some room [m] at both ends. Of several that bend alike there are the first and the
+    one in their middle, which has room for paths that are longer than the line.
     """
     along = scale * np.arange(len(yaw))
     begins = room + np.arange(0.0, max(curve.length - along[-1] - 2.0 * room, 0.0) + 1e-9, 5.0)
     other = curve.at(begins[:, None] + along)[..., 2] - yaw
     bend = np.abs(np.diff(other, axis=1)).sum(axis=1) / along[-1]
-    k = int(np.argmin(np.round(bend, 6)))
-    return _Stretch(chain, curve, float(begins[k]), scale, float(bend[k]))
+    alike = np.flatnonzero(np.round(bend, 6) == np.round(bend, 6).min())
+    chosen = dict.fromkeys((int(alike[0]), int(alike[len(alike) // 2])))
+    return [_Stretch(chain, curve, float(begins[k]), scale, float(bend[k])) for k in chosen]
 
 
 def _half_length(tracks: Sequence[Track]) -> float:

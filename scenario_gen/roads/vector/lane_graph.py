@@ -25,8 +25,8 @@ LEAD_M = 25.0
 LaneChain = tuple[int, ...]
 """Indices of lanes, each a successor of the one before."""
 
-_MAX_START_DISTANCE_M = 8.0  # between a vehicle's start and the lane on which its chain begins
-_MAX_START_TURN_RAD = math.radians(60.0)
+_MAX_NEAR_M = 8.0  # between a pose of a vehicle and a lane that it may be on
+_MAX_NEAR_TURN_RAD = math.radians(60.0)
 _POINT_SPACING_M = 0.5  # of a lane path
 _SMOOTHING_POINTS = 3  # to each side of a point that is averaged: polylines have corners
 _MIN_CROSSING_ANGLE_RAD = math.radians(15.0)
@@ -123,13 +123,12 @@ class LaneGraph:
 
         The nearest lane is first.
         """
-        distance = np.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
-        close = np.flatnonzero(distance <= _MAX_START_DISTANCE_M)
-        turn = np.abs(wrap_angle(self.yaws[close] - pose[2]))
+        close = np.array(self._nearest.query_ball_point(pose[:2], _MAX_NEAR_M), dtype=np.int64)
+        close = close[np.abs(wrap_angle(self.yaws[close] - pose[2])) <= _MAX_NEAR_TURN_RAD]
+        distance = np.hypot(*(self.points[close] - pose[:2]).T)
         nearest: dict[int, float] = {}
-        for k in close[turn <= _MAX_START_TURN_RAD].tolist():
-            lane = int(self.lane_of[k])
-            nearest[lane] = min(nearest.get(lane, math.inf), round(float(distance[k]), 6))
+        for lane, metres in zip(self.lane_of[close].tolist(), distance.tolist(), strict=True):
+            nearest[lane] = min(nearest.get(lane, math.inf), round(metres, 6))
         return sorted(nearest, key=lambda lane: (nearest[lane], lane))
 
     def chains_from(

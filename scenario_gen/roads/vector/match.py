@@ -197,15 +197,19 @@ def _candidates(
     firsts: Sequence[int],
     ends: tuple[str, str],
 ) -> Iterator[_Candidate]:
-    """Yield the chains from the first lanes, or from the lane with the id `ends[0]`."""
+    """Yield the chains from the first lanes, or from the lane with the id `ends[0]`.
+
+    They lead over the lane with the id `ends[1]`, or over one near the last pose, if there is any.
+    """
     closed = graph.closed_to(track)
-    named, lasts = (
-        {k for k, lane in enumerate(graph.network.lanes) if name and lane.id == name}
+    named = [
+        [k for k, lane in enumerate(graph.network.lanes) if lane.id == name] if name else []
         for name in ends
-    )
-    starts = sorted(named) or [k for k in firsts if k not in closed]
+    ]
+    starts = named[0] or [k for k in firsts if k not in closed]
     chains = (chain for k in starts for chain in graph.chains_from(k, driven, closed))
-    chains = (chain for chain in chains if not ends[1] or lasts.intersection(chain))
+    lasts = set(named[1] or graph.near(poses[-1]))
+    chains = (chain for chain in chains if not lasts or lasts.intersection(chain))
     for chain in dict.fromkeys(islice(chains, LIMITS.chains)):
         curve = _part_around(graph.curve(chain), poses, driven)
         stations, offsets = curve.project(poses[:, :2])
