@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import zip_longest
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -103,15 +102,6 @@ class Drives:
         severity = [outcome.verdict.severity for outcome in self.outcomes]
         return sorted(range(len(severity)), key=lambda k: (*(-each for each in severity[k]), k))
 
-    def scores(self) -> dict[str, float]:
-        """Return the means of nuPlan's and NAVSIM's scores and terms, and shares of criteria."""
-        met = ({f"criterion {e['name']}": e["met"] for e in row["criteria"]} for row in self.rows)
-        terms = [row["terms"] | each for row, each in zip(self.rows, met, strict=True)]
-        return {
-            str(name): math.fsum(values) / len(values)
-            for name, values in pd.DataFrame(terms).items()
-        }
-
     def notes(self) -> list[str]:
         """Return sentences that qualify the figures."""
         if not self.rows:
@@ -127,7 +117,6 @@ class Drives:
             self.comparison and self.comparison.sentence(),
             self.mutants,
             self._faults_note(),
-            self._scores_note(),
         )
         return [str(message) for message in messages if message]
 
@@ -186,13 +175,6 @@ class Drives:
             f"at {time:.1f} s: {fault}"
         )
 
-    def _scores_note(self) -> str:
-        scores = self.scores()
-        nuplan, pdms = scores.pop("nuplan"), scores.pop("pdms")
-        terms = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in scores.items()]
-        totals = f"nuPlan's score {nuplan:.3f}, NAVSIM's PDMS {pdms:.3f}"
-        return f"{totals} (means; {', '.join(terms)})"
-
     def document(self) -> dict[str, Any]:
         """Return all verdicts and their summary as JSON's types."""
         parts = {
@@ -205,7 +187,6 @@ class Drives:
             **self.config.facts(),
             "parameters": {name: value for name, (_, value) in flatten(self.config).items()},
             "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
-            "scores": self.scores(),
             "baseline_pass": passed_of(self.baseline).document() if self.baseline else None,
             **{name: part and part.document() for name, part in parts.items()},
             "notes": self.notes(),

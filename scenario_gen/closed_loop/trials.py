@@ -405,6 +405,7 @@ def _where(error: BaseException, config: ClosedLoopConfig) -> str:
 
 
 CONFIDENCE = 0.95
+MIN_PROGRESS_SHARE = 0.2  # of the reference path, as in nuPlan
 
 
 @dataclass(frozen=True)
@@ -452,13 +453,12 @@ def _events(v: DriveVerdict) -> dict[str, bool]:
         "failures": not v.passed,
         "collisions": v.collision is not None,
         "at_fault": v.at_fault,
-        "at_fault_nuplan": v.terms.no_at_fault_collision == 0.0,
         "off_road": not math.isnan(v.off_road),
         "jumps": v.jumps > 0,
         "faults": v.faults > 0,
         "took_turn": v.took_turn,
         "goals": not math.isnan(v.goal),
-        "progress": v.terms.making_progress > 0.0,
+        "progress": v.progress >= MIN_PROGRESS_SHARE,
     }
     if v.criteria:
         events["criteria"] = bool(v.missed)

@@ -6,7 +6,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from scenario_gen.closed_loop.off_road import (
     MAX_DEPTH_M,
     road_use,
 )
-from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.evaluation import distance_and_ttc
 from scenario_gen.numerics import Floats
@@ -109,7 +108,6 @@ class DriveVerdict:
         off_road_depth: depth [m] from which a footprint is off the road.
         jumps: number of poses that no vehicle can reach in a step.
         stood: duration for which the ego stood at the end of the drive.
-        terms: terms of nuPlan's and NAVSIM's scores.
         criteria: results of the user's criteria.
         ran_red: first time at which the ego crossed a stop line at red; NaN if never.
         error: the error of the planner, or of a criterion, that ended the drive; "" without one.
@@ -141,7 +139,6 @@ class DriveVerdict:
     off_road_depth: float
     jumps: int
     stood: float
-    terms: Terms
     criteria: tuple[CriterionResult, ...] = ()
     ran_red: float = math.nan
     error: str = ""
@@ -263,7 +260,6 @@ class DriveVerdict:
             "fault": self.fault,
         }
         plain["sentence"] = self.sentence()
-        plain["terms"] |= {"nuplan": self.terms.nuplan, "pdms": self.terms.pdms}
         plain["criteria"] = [
             {
                 "name": result.name,
@@ -277,20 +273,6 @@ class DriveVerdict:
             key: None if isinstance(value, float) and math.isnan(value) else value
             for key, value in plain.items()
         }
-
-
-class Clearance(NamedTuple):
-    """How close the ego came to the others.
-
-    Attributes:
-        gap: least distance of two footprints [m]; NaN without others.
-        ttc: least time to collision [s], at most the horizon.
-        ttc_not_behind: least time to collision with a vehicle that is not behind the ego [s].
-    """
-
-    gap: float
-    ttc: float
-    ttc_not_behind: float
 
 
 def judge(
@@ -311,7 +293,7 @@ def judge(
     hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
     imposed = imposed_braking(loop, drive)
-    clearance = _clearance(drive, config.horizon, hit)
+    min_gap, min_ttc = _clearance(drive, config.horizon, hit)
     braking = np.maximum(-drive.accelerations, 0.0)
     hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
     road = road_use(drive, loop.road, config.off_road_depth)
@@ -332,8 +314,8 @@ def judge(
         obstacle=obstacle,
         goal=goal,
         delay=goal - loop.duration,
-        min_ttc=clearance.ttc,
-        min_gap=clearance.gap,
+        min_ttc=min_ttc,
+        min_gap=min_gap,
         min_pet=_pet(drive) if hit is None else float(np.fmin(_pet(drive), 0.0)),
         hardest_braking=float(braking.max()),
         hard_braking=round(hard_braking_count * config.step, 9),
@@ -347,7 +329,6 @@ def judge(
         off_road_depth=config.off_road_depth,
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[drive.ego], config.step),
-        terms=terms(drive, hit, not math.isnan(off_road), progress, clearance.ttc_not_behind),
         criteria=tuple(measure(replace(drive, road=loop.road)) for measure in used),
         ran_red=ran_red(drive.motion, drive.ego, drive.driven),
         imposed_braking=imposed,
@@ -366,8 +347,12 @@ def _first_of_ego(
     return other, time
 
 
-def _clearance(drive: Drive, horizon: float, hit: tuple[int, float] | None) -> Clearance:
-    gap, ttc, ttc_not_behind = math.nan, horizon, math.inf
+def _clearance(drive: Drive, horizon: float, hit: tuple[int, float] | None) -> tuple[float, float]:
+    """Return the least distance [m] and TTC [s] of the ego and the others; NaN without others.
+
+    The TTC is at most the horizon.
+    """
+    gap, ttc = math.nan, horizon
     for i in range(len(drive.motion.vehicles)):
         if i == drive.ego:
             continue
@@ -379,9 +364,7 @@ def _clearance(drive: Drive, horizon: float, hit: tuple[int, float] | None) -> C
             distance[k] = to_contact[k] = 0.0
         gap = float(np.fmin(gap, distance.min()))
         ttc = min(ttc, float(to_contact.min()))
-        to_contact = np.where(not_behind(drive, i), to_contact, np.inf)
-        ttc_not_behind = min(ttc_not_behind, float(to_contact.min()))
-    return Clearance(gap, ttc, ttc_not_behind)
+    return gap, ttc
 
 
 def _progress(loop: ClosedLoop, drive: Drive, off_road: float) -> float:

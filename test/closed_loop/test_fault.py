@@ -542,11 +542,3 @@ def test_cut_in_compares_its_safe_gap():
     )
     assert verdict.sentence().count("not at fault") == 1
     assert float(safe_gap(14.0, 14.0)) == pytest.approx(14.0 + 196.0 / 12.0 - 196.0 / 18.0)
-
-
-def test_nuplans_rule_sees_no_turn():
-    """It blames who touches with its front, and acquits who is hit in its side out of turn."""
-    assert judged(comes_late_in_its_turn, 0).terms.no_at_fault_collision == 0.0
-    shown = [judged(pulls_out_and_is_hit, seed) for seed in range(12)]
-    assert all(one.at_fault for one in shown)
-    assert any(one.terms.no_at_fault_collision == 1.0 for one in shown)

@@ -3,6 +3,7 @@
 
 """Verdicts against cases made by hand, where the answer is known."""
 
+from dataclasses import replace
 import json
 import math
 from xml.etree import ElementTree
@@ -21,6 +22,7 @@ from scenario_gen.closed_loop.results import as_junit, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import rates, run_trials
 from scenario_gen.closed_loop.verdict import judge, Runner
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.types.road import Road
 
 TIME = np.arange(150) * PERIOD
@@ -96,7 +98,7 @@ def test_contact_between_instants_is_found():
     )
 
 
-def test_off_road_goal_progress_and_comfort():
+def test_off_road_goal_and_progress():
     drivable = np.zeros((100, 1000), dtype=np.bool_)
     drivable[40:60] = True  # y from -2 to 2 m
     road = Road(
@@ -201,3 +203,95 @@ def test_json_junit_rates_and_bars(trials):
         "goals: 66.7 %; at least 90.0 % is required",
         "min_ttc: 0.00 s; at least 0.50 s is required",
     ]
+
+
+def test_reasons_of_straight_contacts():
+    stands, comes = straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)
+    ahead = straight(30.0, 0, 0, 4.0)
+    for motions, reason in (
+        ([comes, stands], "rear_end"),
+        ([stands, comes], "standing"),
+        ([ahead, comes], "other_ran_into_ego"),
+    ):
+        assert verdict_of(motions, go_on)[0].fault == reason
+
+
+def test_reference_speed_passes_standing_does_not():
+    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
+    assert verdict_of(motions, go_on)[0].fault == ""
+    verdict, _ = verdict_of(motions, lambda _: Command(-3.0, 0.0))
+    assert verdict.fault == "standing" and verdict.progress < 0.2
+
+
+def test_jump_fails_despite_the_goal():
+    verdict, _ = verdict_of(
+        [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)],
+        lambda _: Pose(149.0, 0.0, 0.0, 10.0),
+    )
+    assert np.isnan(verdict.goal) and verdict.jumps == 1 and verdict.collision is None
+    assert (
+        not verdict.passed
+        and verdict.fault == verdict.failure == "jump"
+        and "1 teleport(s)" in verdict.sentence()
+    )
+
+
+def test_jump_is_no_collision_or_exit():
+    """From one lane across another car to a place beyond the road's edge."""
+    drivable = np.ones((100, 1000), dtype=np.bool_)
+    road = Road(
+        "field", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
+    )
+    motions = [straight(0, 0, 0, 10.0), straight(0.0, 4.0, 0, 10.0)]
+    verdict, _ = verdict_of(
+        motions,
+        lambda seen: Pose(10.0 * (seen.time + 0.1), 80.0 * (seen.time > 0.45), 0.0, 10.0),
+        road=road,
+    )
+    assert (
+        verdict.failure == "jump"
+        and verdict.collision is None
+        and np.isnan(verdict.off_road)
+        and verdict.road_margin > 0.0
+    )
+
+
+@pytest.mark.parametrize(("aside", "counted"), [(0.02, False), (0.3, True)])
+def test_off_road_counts_from_a_depth(aside, counted):
+    drivable = np.zeros((100, 1000), dtype=np.bool_)
+    drivable[40:60] = True  # y from -2 to 2 m
+    road = Road(
+        "strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
+    )
+    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
+
+    def beside(seen):
+        time = seen.time + 0.1
+        return Pose(10.0 * time, min(time, 1.1 + aside), 0.0, 10.0)
+
+    verdict, drive = verdict_of(motions, beside, road=road)
+    assert (
+        verdict.road_margin == pytest.approx(-aside, abs=1e-6)
+        and np.isfinite(verdict.off_road) == counted
+    )
+    assert verdict.passed != counted and (f"by {aside:.2f} m" in verdict.sentence()) == counted
+    assert drive.motion.position[0, -1, 1] > 1.1
+    verdict, _ = verdict_of(motions, beside, road=road, off_road_depth=0.0)
+    assert np.isfinite(verdict.off_road)
+    verdict, _ = verdict_of(motions, go_on, road=road)
+    assert verdict.road_margin == pytest.approx(1.1)
+    assert "by more than 10 m" in replace(verdict, off_road=1.0, road_margin=-10.0).sentence()
+
+
+def test_obstacle_in_the_way_is_named():
+    config = RoadConfig(arm_length=100.0)
+    x, y = build_road("straight", config=config).lanes.lanes[0].centre[30].tolist()
+    name = f"{x:g} {y + 1.85:g} 0 4 2"
+    road = build_road("straight", config=replace(config, obstacles=name))
+    others = straight(60.0, y, 0.0, 10.0)
+    verdict, _ = verdict_of([straight(5.0, y, 0.0, 10.0), others], go_on, road=road)
+    assert verdict.off_road == pytest.approx(0.1 * (x - 2.0 - 2.0 - 5.0), abs=0.01)
+    assert (verdict.failure, verdict.fault, verdict.obstacle) == ("off_road", "obstacle", name)
+    assert f"ran into obstacle `{name}` at" in verdict.sentence()
+    passed, _ = verdict_of([straight(5.0, y - 0.3, 0.0, 10.0), others], go_on, road=road)
+    assert passed.obstacle == "" and passed.passed
