@@ -12,9 +12,8 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.routing.config import make_rrt_star_connect
 from scenario_gen.method.routing.legs import choose_waypoints
-from scenario_gen.method.routing.route_points import route_along
 from scenario_gen.method.routing.search.planner import BlockedError
-from scenario_gen.method.routing.task import VehicleTask
+from scenario_gen.method.routing.task import route_along, VehicleTask
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import arc_lengths, edge_yaws
 from scenario_gen.roads import footprint_fits, ground_for

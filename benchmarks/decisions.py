@@ -18,9 +18,8 @@ from scipy import optimize, special
 from benchmarks.coverage import recorded_pairs
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.approaches import approaches, offered_lag_of
+from scenario_gen.method.approaches import approaches, offered_lag_of, pair_of
 from scenario_gen.method.decisions import refuse_undecided
-from scenario_gen.method.interacting_pair import pair_of
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import EncounterKind

@@ -40,7 +40,6 @@ STAGES = (
     "validity",
     "sampling",
     "evaluation",
-    "interacting_pair",
     "drives",
     "approaches",
     "continuation",

@@ -29,7 +29,14 @@ import numpy as np
 from scipy import special
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.approaches import approaches, MARGINS, offered_lag_of, two_drives
+from scenario_gen.method.approaches import (
+    approaches,
+    InteractingPair,
+    MARGINS,
+    offered_lag_of,
+    pair_of,
+    two_drives,
+)
 from scenario_gen.method.drives import (
     delayed_drive,
     Drive,
@@ -37,7 +44,6 @@ from scenario_gen.method.drives import (
     Stop,
 )
 from scenario_gen.method.evaluation.law import DISTANCE
-from scenario_gen.method.interacting_pair import InteractingPair, pair_of
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.situation import conflict_of, passing, Situation, Track
 from scenario_gen.situation.evidence import heading_difference, LIMITS

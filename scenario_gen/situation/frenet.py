@@ -18,7 +18,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.situation.tracks import Track, turn_of, TURN_WINDOW_M
-from scenario_gen.smoothing.spline import smoothing_spline
+from scenario_gen.smoothing.path import smoothing_spline
 
 MAX_ROAD_ANGLE_RAD = np.radians(50.0)  # between a vehicle and the road that it drives along
 SAME_LANE_M = 1.75  # difference of offsets of vehicles in one lane

@@ -31,8 +31,7 @@ from scenario_gen.numerics import (
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, polyline_of, unit
 from scenario_gen.smoothing.noise import estimated_noise
-from scenario_gen.smoothing.path import fit_path
-from scenario_gen.smoothing.spline import GRID_STEP_M
+from scenario_gen.smoothing.path import fit_path, GRID_STEP_M
 from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle
 
 CURVATURE_SHARE = 0.8  # of a type's sharpest curve; for a car 0.2 1/m, nearly its tightest turn

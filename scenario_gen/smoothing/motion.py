@@ -13,7 +13,7 @@ from scipy import linalg, sparse
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.smoothing.spline import differences, observe
+from scenario_gen.smoothing.path import differences, observe
 
 
 class UnreconciledError(InputError):

@@ -21,8 +21,7 @@ from scenario_gen.logs.smoothing import (
 )
 from scenario_gen.smoothing.motion import Motion
 from scenario_gen.smoothing.noise import estimated_noise, white_equivalent
-from scenario_gen.smoothing.path import fit_path, headings_of, straight_path
-from scenario_gen.smoothing.spline import smoothing_spline
+from scenario_gen.smoothing.path import fit_path, headings_of, smoothing_spline, straight_path
 
 CONFIG = LogConfig()
 

@@ -5,11 +5,6 @@
 
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
-from scenario_gen.method.evaluation.criticality import (
-    criticality,
-    distance_and_ttc,
-    footprint_distance,
-)
 from scenario_gen.method.evaluation.distributions import (
     Bootstrap,
     clustered_wilson,
@@ -23,20 +18,25 @@ from scenario_gen.method.evaluation.evaluate import (
     MEASURED_SCENARIOS,
 )
 from scenario_gen.method.evaluation.law import measures_in
-from scenario_gen.method.evaluation.metrics import MetricGroup
-from scenario_gen.method.evaluation.non_reactive import (
-    free_acceleration,
-    MAX_ACCELERATION_MPS2,
-    MAX_BRAKING_MPS2,
-    STANDSTILL_MPS,
-    wanted_speeds,
+from scenario_gen.method.evaluation.measures import (
+    criticality,
+    distance_and_ttc,
+    footprint_distance,
 )
+from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.samples import common_motion, replay, Samples, Template
 from scenario_gen.method.evaluation.similarity import (
     mean_correlation,
     mean_error,
 )
-from scenario_gen.method.evaluation.time_shift import min_time_shift
+from scenario_gen.method.evaluation.time_shift import (
+    free_acceleration,
+    MAX_ACCELERATION_MPS2,
+    MAX_BRAKING_MPS2,
+    min_time_shift,
+    STANDSTILL_MPS,
+    wanted_speeds,
+)
 
 __all__ = [
     "MAX_ACCELERATION_MPS2",

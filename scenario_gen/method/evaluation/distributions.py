@@ -15,7 +15,7 @@ import numpy as np
 from scipy import special
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.evaluation.criticality import footprint_distance
+from scenario_gen.method.evaluation.measures import footprint_distance
 from scenario_gen.numerics import Bools, Floats, Ints, running_sum
 from scenario_gen.types import Interval, Motion
 

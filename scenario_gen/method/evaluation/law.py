@@ -28,9 +28,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 import scenario_gen
-from scenario_gen.method.evaluation.criticality import footprint_distance
-from scenario_gen.method.evaluation.measures import FIGURE_PERIOD_S, figures_of, MEASURES
-from scenario_gen.method.evaluation.non_reactive import STANDSTILL_MPS
+from scenario_gen.method.evaluation.measures import (
+    FIGURE_PERIOD_S,
+    figures_of,
+    footprint_distance,
+    MEASURES,
+)
+from scenario_gen.method.evaluation.time_shift import STANDSTILL_MPS
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import (
     Conflict,

@@ -14,8 +14,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.registry import Registry
 from scenario_gen.method.evaluation import similarity
 from scenario_gen.method.evaluation.config import EvaluationConfig
-from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of, wilson
+from scenario_gen.method.evaluation.measures import criticality
 from scenario_gen.method.evaluation.samples import Samples, Template
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import is_same_turn

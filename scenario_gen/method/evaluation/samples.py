@@ -11,9 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.method.evaluation.config import EvaluationConfig
-from scenario_gen.method.evaluation.criticality import Criticality, criticality
 from scenario_gen.method.evaluation.distributions import Bootstrap, values_of
 from scenario_gen.method.evaluation.dtw import Distance
+from scenario_gen.method.evaluation.measures import Criticality, criticality
 from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimilarity
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import CheckCounts, cut, Encounter, Fit, FittedVehicle, Motion, Scenario

@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The fitting: how a recording is placed on a road."""
+"""The fitting: how a recording is placed on a road.
 
+Each vehicle follows a chain of lanes, if the road has lanes.
+"""
+
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
+import math
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.lanes import place_on_lanes
-from scenario_gen.method.fitting.losses import lost_lights, refuse_lost
+from scenario_gen.method.fitting.losses import find_unused, lost_lights, refuse_lost
 from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,
@@ -21,8 +25,17 @@ from scenario_gen.method.fitting.placement import (
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.state_check import refuse_impossible, refuse_misfits
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
-from scenario_gen.roads import ground_for, nearest_pose_with_room, share_with_room
+from scenario_gen.roads import (
+    best_place,
+    ground_for,
+    lane_graph,
+    LanePath,
+    nearest_pose_with_room,
+    share_with_room,
+    users_of,
+)
 from scenario_gen.situation import (
+    drivers_of,
     find_losses,
     manoeuvre_of,
     refuse_reversing,
@@ -35,6 +48,7 @@ from scenario_gen.types import (
     Encounter,
     Fit,
     FittedVehicle,
+    LaneNetwork,
     Note,
     NoteKind,
     Request,
@@ -42,6 +56,41 @@ from scenario_gen.types import (
     Segmentation,
     TypeLimits,
 )
+
+
+def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
+    """Place a recording on a road's lanes at the best place with room for all vehicles.
+
+    Raises:
+        RefusedError: there is no place; the message has the reason of the best attempt.
+    """
+    drivers = drivers_of(tracks)
+    if road.lanes is None:
+        raise RefusedError(f"road {road.name} has no lanes; choose another fitting.placement")
+    if drivers[0].vehicle.kind.walks:
+        raise RefusedError(
+            "no recorded vehicle drives, so the encounter cannot be placed on the lanes of road "
+            f"{road.name}"
+        )
+    network = lane_graph(road.lanes, users_of(drivers)).network
+    place = best_place(road, tracks, config.place_limits)
+    paths = place.match.paths
+    notes = [*network.notes]
+    notes += [_note(path, track, network) for path, track in zip(paths, drivers, strict=True)]
+    if place.scale != 1.0:
+        notes.append(Note.of(NoteKind.SCALED, scale=place.scale))
+    placement = Placement.separated(place.separation, place.scale, notes)
+    return replace(placement, unused=find_unused(network, [k for p in paths for k in p.lanes]))
+
+
+def _note(path: LanePath, track: Track, network: LaneNetwork) -> Note:
+    """Return the note on the lanes of a vehicle, and on a speed above their limit."""
+    lanes = ", ".join(network.lanes[k].id for k in path.lanes)
+    limit = max((network.lanes[k].speed_limit for k in path.lanes), default=math.nan)
+    fastest = float(track.speed.max())
+    if fastest > limit + 0.5:
+        lanes += f"; its {fastest:.1f} m/s exceed their limit of {limit:.1f} m/s"
+    return Note.of(NoteKind.ON_LANES, vehicle=track.vehicle.id, lanes=lanes)
 
 
 def assemble_fit(

@@ -14,7 +14,6 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
-from scenario_gen.method.routing.route_points import distances_to_line
 from scenario_gen.method.routing.search.dubins import arc_poses, dubins_poses
 from scenario_gen.method.routing.search.planner import (
     BlockedError,
@@ -27,7 +26,7 @@ from scenario_gen.method.routing.search.planner import (
 )
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Guess
-from scenario_gen.method.routing.task import off_road, VehicleTask
+from scenario_gen.method.routing.task import distances_to_line, off_road, VehicleTask
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import (
     ahead_and_left,

@@ -11,10 +11,15 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
 from scenario_gen.method.routing.legs import anchor_weights, choose_waypoints, join_waypoints, Legs
-from scenario_gen.method.routing.route_points import max_distance, route_along
 from scenario_gen.method.routing.search.planner import Planner
 from scenario_gen.method.routing.smooth import Curve, Guess, not_drivable, smooth
-from scenario_gen.method.routing.task import too_narrow, too_tight, VehicleTask
+from scenario_gen.method.routing.task import (
+    max_distance,
+    route_along,
+    too_narrow,
+    too_tight,
+    VehicleTask,
+)
 from scenario_gen.roads import footprint_fits, ground_for, own_side
 from scenario_gen.types import Fit, Road, Route, TypeLimits
 

@@ -17,10 +17,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
-from scenario_gen.method.routing.route_points import monotone_matching, squared_distances
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.method.routing.task import VehicleTask
+from scenario_gen.method.routing.task import monotone_matching, squared_distances, VehicleTask
 from scenario_gen.numerics import Floats, running_sum, wrap_angle
 from scenario_gen.numerics.plane import arc_lengths, edge_lengths, unit
 

@@ -10,7 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.candidates import CandidateModel
+from scenario_gen.method.sampling.candidates import (
+    ACCELERATION_DECAY_S,
+    CandidateModel,
+    MAX_EXTRAPOLATION_S,
+)
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.deviations import (
     lateral_covariance_root,
@@ -19,15 +23,19 @@ from scenario_gen.method.sampling.deviations import (
     road_ahead,
     ROOM_SIGMAS,
 )
-from scenario_gen.method.sampling.extrapolation import ACCELERATION_DECAY_S, MAX_EXTRAPOLATION_S
-from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, template_grid
 from scenario_gen.method.sampling.place_lights import with_lights
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.routed_vehicle import route_vehicle, RoutedVehicle
-from scenario_gen.method.sampling.speed_profile.knots import least_shares, standing_part
 from scenario_gen.method.sampling.speed_profile.mean import MeanSpeed
 from scenario_gen.method.sampling.speed_profile.model import SpeedModel
-from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
+from scenario_gen.method.sampling.speed_profile.spline import least_shares, standing_part
+from scenario_gen.method.sampling.time_warp import (
+    Clock,
+    clock_from_rate,
+    slowed_clock,
+    template_grid,
+    TimeWarp,
+)
 from scenario_gen.method.sampling.trimming import trimming_of
 from scenario_gen.method.sampling.variation import Variation, VehicleClock
 from scenario_gen.method.sampling.vehicle_model import VehicleModel

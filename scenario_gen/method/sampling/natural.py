@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.draw import enough_share
 from scenario_gen.method.sampling.filters import (
     CheckScenarios,
     Filters,
@@ -19,6 +18,7 @@ from scenario_gen.method.sampling.filters import (
 )
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.sampler import Block, LEVELS, Sampler, searched_index
+from scenario_gen.method.sampling.stage import enough_share
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Measures, Scenario
 

@@ -13,14 +13,6 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.deviations import Steering
 from scenario_gen.method.sampling.path import BasePath, MIN_NODES_COUNT, NODE_SPACING_M
 from scenario_gen.method.sampling.plan import Plan
-from scenario_gen.method.sampling.speed_profile.knots import (
-    lengthened_waits,
-    MIN_WAIT_S,
-    speed_knots,
-    SpeedKnots,
-    STANDING_MPS,
-    standing_within,
-)
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
     mean_speed,
@@ -29,7 +21,15 @@ from scenario_gen.method.sampling.speed_profile.mean import (
     rounded_lines,
     Target,
 )
-from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
+from scenario_gen.method.sampling.speed_profile.spline import (
+    lengthened_waits,
+    MIN_WAIT_S,
+    speed_knots,
+    SpeedKnots,
+    SpeedSpline,
+    STANDING_MPS,
+    standing_within,
+)
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import Track, Wait

@@ -15,7 +15,6 @@ from support.evaluation_worlds import CARS, crossing, samples
 
 from benchmarks._feature_matrix import feature_matrix, pair_similarities
 from scenario_gen.method.evaluation import evaluate_scenarios, similarity
-from scenario_gen.method.evaluation.criticality import distance_and_ttc, footprint_distance
 from scenario_gen.method.evaluation.distributions import (
     Bootstrap,
     compare,
@@ -24,6 +23,7 @@ from scenario_gen.method.evaluation.distributions import (
     values_of,
     wilson,
 )
+from scenario_gen.method.evaluation.measures import distance_and_ttc, footprint_distance
 from scenario_gen.types import Motion, Vehicle
 
 ONCE = np.ones((1, 1))

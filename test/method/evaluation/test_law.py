@@ -15,7 +15,6 @@ from support.reaction_scenes import answering, lane_encounter, wander
 from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
-from scenario_gen.method.evaluation.criticality import distance_and_ttc
 from scenario_gen.method.evaluation.law import (
     FEATURES,
     features_of,
@@ -25,6 +24,7 @@ from scenario_gen.method.evaluation.law import (
     SHIPPED,
     VEHICLE_FEATURES,
 )
+from scenario_gen.method.evaluation.measures import distance_and_ttc
 from scenario_gen.method.sampling import (
     SamplingConfig,
 )

@@ -10,7 +10,7 @@ import pytest
 
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.routing.route_points import distances_to_line
+from scenario_gen.method.routing.task import distances_to_line
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.vehicle_model import NoiseScale

@@ -12,12 +12,7 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
-from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, SLOWING_S
 from scenario_gen.method.sampling.speed_profile import mean as mean_module
-from scenario_gen.method.sampling.speed_profile.knots import (
-    lengthened_waits,
-    MIN_WAIT_S,
-)
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
     fixed_coefficients,
@@ -27,7 +22,13 @@ from scenario_gen.method.sampling.speed_profile.mean import (
     Target,
 )
 from scenario_gen.method.sampling.speed_profile.model import kernel_root, SpeedModel
-from scenario_gen.method.sampling.speed_profile.spline import KNOT_SPACING_S, SpeedSpline
+from scenario_gen.method.sampling.speed_profile.spline import (
+    KNOT_SPACING_S,
+    lengthened_waits,
+    MIN_WAIT_S,
+    SpeedSpline,
+)
+from scenario_gen.method.sampling.time_warp import clock_from_rate, slowed_clock, SLOWING_S
 from scenario_gen.situation import Wait
 
 TIME = np.arange(201) * 0.1

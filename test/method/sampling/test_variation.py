@@ -13,12 +13,12 @@ from support.sampling_scenes import scene_plan
 
 from scenario_gen.method.sampling import draw_scenarios, relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
-from scenario_gen.method.sampling.extrapolation import (
+from scenario_gen.method.sampling.candidates import (
     ACCELERATION_DECAY_S,
     extrapolate,
     extrapolation_time,
 )
-from scenario_gen.method.sampling.nominal_clock import clock_from_rate
+from scenario_gen.method.sampling.time_warp import clock_from_rate
 from scenario_gen.method.sampling.variation import CAR_SIZES, truncate, Variation, VehicleClock
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker

@@ -19,8 +19,7 @@ import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from scipy import linalg, sparse
 
-from scenario_gen.method.sampling.speed_profile.knots import SpeedKnots
-from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
+from scenario_gen.method.sampling.speed_profile.spline import SpeedKnots, SpeedSpline
 from scenario_gen.numerics import Bools, Floats
 
 SMOOTHING_S = 0.5  # ℓ: kinks of the lines are rounded over about this time
