@@ -29,6 +29,7 @@ PARTS = (
     "oracle",
     "properties",
     "recorded",
+    "speed",
     "tests",
 )
 OUT = Path("out/soak")
