@@ -14,8 +14,7 @@ from scenario_gen.method.routing.config import make_rrt_star_connect
 from scenario_gen.method.routing.legs import choose_waypoints
 from scenario_gen.method.routing.search.planner import BlockedError
 from scenario_gen.method.routing.task import route_along, VehicleTask
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import arc_lengths, edge_yaws
+from scenario_gen.numerics import arc_lengths, edge_yaws, Floats
 from scenario_gen.roads import footprint_fits, ground_for
 from scenario_gen.types import Fit, Road, Route, TypeLimits
 

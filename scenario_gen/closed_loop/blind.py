@@ -23,11 +23,10 @@ from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, edge_lengths, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import B1, F, F2, kernel, OUTB2
-from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.types import GenerationResult, join_ego
 
 WAITS_S = tuple(0.5 * k for k in range(61))

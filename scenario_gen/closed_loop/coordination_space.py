@@ -20,11 +20,10 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.lights import red_phases
-from scenario_gen.numerics import Bools, Floats, frozen
+from scenario_gen.numerics import Bools, Floats, frozen, unit
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.hermite import cubic, interval_at
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT2, OUT3
-from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, passing
 from scenario_gen.types import FOLLOW, Scenario, tokens
 

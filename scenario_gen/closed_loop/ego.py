@@ -16,7 +16,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.numerics.plane import angle_between
+from scenario_gen.numerics import angle_between
 from scenario_gen.types import Dynamics
 
 

@@ -33,8 +33,7 @@ from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import trials_in
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, unit
+from scenario_gen.numerics import ahead_and_left, angle_between, Floats, place, unit
 from scenario_gen.types import GenerationResult, MAX_PLANNED_CURVATURE_PER_M
 
 MAX_OTHERS_COUNT = 8

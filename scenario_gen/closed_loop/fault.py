@@ -22,10 +22,9 @@ import shapely
 
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.simulation import ClosedLoop, PAST_GOAL_M
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import ahead_and_left, Bools, edge_lengths, Floats, Ints, place
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, edge_lengths, place
 from scenario_gen.situation import Conflict
 from scenario_gen.types import Vehicle
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, Bools, Floats
 
 HALF_SIZE_M = 30.0
 

@@ -23,8 +23,7 @@ from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import Observation, Task
 from scenario_gen.closed_loop.trials import find_planner, MakePlanner, Outcome, trial_runner
-from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, Bools, Floats
 
 SAME_DIRECTION_RATIO = 0.7  # least cosine of the angle between two headings of one direction
 KMH_PER_MPS = 3.6

@@ -16,11 +16,10 @@ import shapely
 
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, edge_lengths, Floats
 from scenario_gen.numerics.boxes import Box, box_distance, box_gap, corners
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import F, F2, kernel
-from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import footprint_fits, to_cells
 from scenario_gen.roads.clearance import footprint_free, is_open
 from scenario_gen.types import Motion, Obstacle, Road

@@ -9,8 +9,7 @@ import hashlib
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, Ints
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, Floats, Ints
 from scenario_gen.types import Road, Scenario
 
 COPY_TOLERANCE_M = 0.1  # greatest difference of any vehicle's position in two copies

@@ -17,9 +17,8 @@ from scenario_gen.method.evaluation import (
     STANDSTILL_MPS,
     wanted_speeds,
 )
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import ahead_and_left, Floats, place
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.types import SignalState
 
 BUILT_IN = ("ConstantSpeed", "IdmFollower", "NonReactive", "ReferenceFollower")

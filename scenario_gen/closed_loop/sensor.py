@@ -16,8 +16,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.config import ObservationConfig
 from scenario_gen.closed_loop.driver_traits import driver_draws
-from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.plane import ahead_and_left, place
+from scenario_gen.numerics import ahead_and_left, Bools, Floats, place
 from scenario_gen.numerics.polygons import distance_field
 from scenario_gen.roads import segments_free
 from scenario_gen.types import Road, Scenario

@@ -33,8 +33,7 @@ from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.lights import observed, ObservedLight
 from scenario_gen.closed_loop.sensor import Sensor
 from scenario_gen.closed_loop.step import advance, ego_hits
-from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
+from scenario_gen.numerics import ahead_and_left, Bools, edge_lengths, Floats, wrap_angle
 from scenario_gen.roads import ground_for
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Dynamics, Facts, Road, Scenario, trailer_poses, Vehicle

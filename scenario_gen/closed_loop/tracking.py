@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import ahead_and_left, angle_between
+from scenario_gen.numerics import ahead_and_left, angle_between, Floats
 
 LOOK_AHEAD_S = 0.6
 

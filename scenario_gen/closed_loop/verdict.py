@@ -31,8 +31,7 @@ from scenario_gen.closed_loop.off_road import (
 )
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.evaluation import distance_and_ttc
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import unit
+from scenario_gen.numerics import Floats, unit
 from scenario_gen.situation import conflict_of, encroachment
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]

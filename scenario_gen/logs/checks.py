@@ -16,8 +16,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import RawLog
-from scenario_gen.numerics import Bools, Floats, runs
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, Bools, Floats, runs
 from scenario_gen.types import Encounter, together
 
 

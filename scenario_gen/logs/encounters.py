@@ -22,8 +22,7 @@ from scenario_gen.logs.smoothing import (
     speed_of_fixes,
     standing,
 )
-from scenario_gen.numerics import Bools, Floats, running_sum, runs
-from scenario_gen.numerics.plane import edge_lengths, unit
+from scenario_gen.numerics import Bools, edge_lengths, Floats, running_sum, runs, unit
 from scenario_gen.smoothing.motion import UnreconciledError
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 

@@ -17,8 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, Ints, wrap_angle
-from scenario_gen.numerics.plane import unit
+from scenario_gen.numerics import Floats, Ints, unit, wrap_angle
 from scenario_gen.types import Encounter
 
 EARTH_RADIUS_M = 6_371_000.0

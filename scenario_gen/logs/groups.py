@@ -24,9 +24,8 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.gap import height_apart, INTERACTS_M, space_time_gap
 from scenario_gen.logs.growing import Group, Growth, Meeting, MIN_MET_SHARE, Span
-from scenario_gen.numerics import Floats, Ints, runs
+from scenario_gen.numerics import arc_lengths, Floats, Ints, runs
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.numerics.plane import arc_lengths
 
 AROUND_CROSSING_S = 3.0
 """Time for which a vehicle is kept before and after it crosses another path."""

@@ -14,8 +14,7 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, Ints, wrap_angle
-from scenario_gen.numerics.plane import unit, unit_left
+from scenario_gen.numerics import Floats, Ints, unit, unit_left, wrap_angle
 from scenario_gen.types import (
     Encounter,
     fronts,

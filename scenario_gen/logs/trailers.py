@@ -13,7 +13,7 @@ import numpy as np
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.kinds import MAX_LENGTH_M
 from scenario_gen.logs.raw import Observations
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left
 from scenario_gen.types import Encounter, together, TRAILER, Trailer, TRUCK, Vehicle
 
 

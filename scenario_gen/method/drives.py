@@ -16,9 +16,8 @@ import numpy as np
 from scipy import ndimage
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, running_sum, runs
+from scenario_gen.numerics import Floats, polyline_of, running_sum, runs
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import polyline_of
 from scenario_gen.situation import Track
 from scenario_gen.situation.evidence import smoothed_speed
 from scenario_gen.situation.waits import MIN_WAIT_S

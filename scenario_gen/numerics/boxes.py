@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics.arrays import Floats, place
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1, OUT2
-from scenario_gen.numerics.plane import place
 
 MIN_CLOSING_SPEED_MPS = 1e-6  # rounding alone gives equal velocities a smaller difference
 

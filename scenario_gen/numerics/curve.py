@@ -9,9 +9,8 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics.arrays import arc_lengths, edge_lengths, edge_yaws, Floats, frozen
 from scenario_gen.numerics.kernels import F, F1, F2, kernel, OUT2
-from scenario_gen.numerics.plane import arc_lengths, edge_lengths, edge_yaws
 
 _ROUNDING_M = 1e-6  # of arc lengths and distances, so that it excludes no edge
 

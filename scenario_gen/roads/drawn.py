@@ -17,9 +17,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import angle_between, Floats, unit
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, unit
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.lights import arm_lights
 from scenario_gen.roads.pavement import drivable_width, inside, paved, ring, strip, swept

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import angle_between, unit, unit_left
+from scenario_gen.numerics import angle_between, Floats, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP_M
 from scenario_gen.situation import pair_crossings, Track, turn_of

@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import place
+from scenario_gen.numerics import Floats, place
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.junction_arms import (

@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, place
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import place
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.situation import driver_rows, faced_light, Situation
 from scenario_gen.types import (

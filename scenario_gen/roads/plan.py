@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, unit, unit_left
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.ways import reverse
 from scenario_gen.situation import Track

@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, place, unit
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import place, unit
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.pavement import (

@@ -13,9 +13,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics import (
+    ahead_and_left,
+    angle_between,
+    Floats,
+    frozen,
+    place,
+    polyline_of,
+    unit,
+)
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, polyline_of, unit
 
 Fits = Callable[[Floats], bool]
 """Returns whether poses (M, 3) have room."""

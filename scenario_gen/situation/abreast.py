@@ -10,8 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, Bools, Floats, wrap_angle
 from scenario_gen.situation.tracks import Track
 
 MIN_SIDE_BY_SIDE_S: Final = 1.0  # shorter encounters are not compared

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import angle_between, Floats
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.numerics.plane import angle_between
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.situation.gaps import MIN_HEADWAY_SPEED_MPS
 from scenario_gen.situation.tracks import Track

@@ -23,15 +23,16 @@ from enum import StrEnum
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, wrap_angle
-from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import (
+from scenario_gen.numerics import (
     ahead_and_left,
     angle_between,
     edge_lengths,
+    Floats,
     meeting_shares,
     unit,
+    wrap_angle,
 )
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.types import Motion, together
 
 

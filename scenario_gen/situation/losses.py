@@ -9,8 +9,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, Bools, wrap_angle
 from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation.abreast import (
     abreast_in_lane,

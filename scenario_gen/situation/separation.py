@@ -11,10 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics import ahead_and_left, Floats, frozen
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.situation.tracks import Track
 from scenario_gen.types import Encounter, Note, NoteKind, together
 

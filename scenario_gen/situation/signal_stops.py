@@ -9,8 +9,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import Ints
-from scenario_gen.numerics.plane import angle_between
+from scenario_gen.numerics import angle_between, Ints
 from scenario_gen.situation.waits import STANDSTILL_SPEED_MPS, Wait
 from scenario_gen.types import (
     Encounter,

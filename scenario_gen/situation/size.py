@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left
 from scenario_gen.types import Encounter
 
 MAX_VEHICLES = 64  # the largest encounter that is cut from a log

@@ -20,16 +20,18 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import (
+    angle_between,
     Bools,
     Floats,
     frozen,
     frozen_ints,
     Ints,
+    polyline_of,
     running_sum,
+    unit,
     wrap_angle,
 )
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between, polyline_of, unit
 from scenario_gen.smoothing.noise import estimated_noise
 from scenario_gen.smoothing.path import fit_path, GRID_STEP_M
 from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, wrap_angle
 from scenario_gen.types import Encounter
 
 ONCOMING_RAD = np.radians(150.0)  # least difference of headings

@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics import ahead_and_left, wrap_angle
 from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.situation.evidence import (

@@ -14,8 +14,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import CAR, LANE_USERS
-from scenario_gen.numerics import Floats, freeze, frozen
-from scenario_gen.numerics.plane import edge_yaws, place
+from scenario_gen.numerics import edge_yaws, Floats, freeze, frozen, place
 from scenario_gen.types.notes import Note
 from scenario_gen.types.signal_schedule import SignalSchedule
 

@@ -11,9 +11,8 @@ import numpy as np
 import shapely
 from shapely import LineString
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, place
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import place
 from scenario_gen.types.lanes import CARS, DRIVERS, Lane, LaneNetwork, RuleKind
 
 _MAX_SHARED_GAP_M = 0.3  # between the borders of two lanes that are one line

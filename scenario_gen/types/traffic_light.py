@@ -11,8 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, freeze, frozen, Ints
-from scenario_gen.numerics.plane import angle_between, unit
+from scenario_gen.numerics import angle_between, Floats, freeze, frozen, Ints, unit
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.signal_schedule import SignalSchedule
 

@@ -18,8 +18,7 @@ from scenario_gen.base.road_users import (
     VEHICLE_TYPES,
     VehicleType,
 )
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import edge_lengths, edge_yaws, unit
+from scenario_gen.numerics import edge_lengths, edge_yaws, Floats, unit
 
 
 @dataclass(frozen=True)

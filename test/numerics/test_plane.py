@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 
-from scenario_gen.numerics.plane import (
+from scenario_gen.numerics import (
     ahead_and_left,
     angle_between,
     edge_lengths,

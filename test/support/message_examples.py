@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 import numpy as np
 
 from msg_conventions import roads
-from scenario_gen.numerics.plane import arc_lengths
+from scenario_gen.numerics import arc_lengths
 from scenario_gen.types import Encounter, LaneNetwork, Road, Vehicle
 from scenario_gen.types.fit import Route, Segmentation
 from scenario_gen.types.scenario import Scenario

@@ -18,7 +18,7 @@ from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics.plane import arc_lengths
+from scenario_gen.numerics import arc_lengths
 from scenario_gen.types import Decision, Facts, Failure, Scenario
 
 MAX_FINDINGS_COUNT = 100  # each is driven again and saved

@@ -31,10 +31,9 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.method.evaluation.time_shift import blind_margin
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, unit
 from scenario_gen.numerics.boxes import Box, box_distance, time_to_touch
 from scenario_gen.numerics.kernels import B, F, F1, F2, kernel, named, OUT1
-from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import (
     Conflict,
     conflicts_by_pair,

@@ -15,11 +15,10 @@ miss the others.
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, edge_lengths, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import F2, kernel, OUT1
-from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.types import Motion, Vehicle
 
 DENSITY_FACTOR = 4  # poses of the other vehicle for one pose of the ego

@@ -11,9 +11,8 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.numerics import Bools, Floats, frozen
+from scenario_gen.numerics import Bools, Floats, frozen, place
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import place
 from scenario_gen.roads import draw_route, has_room, max_repair, share_with_room
 from scenario_gen.situation import Separation, Situation, Track
 from scenario_gen.types import Encounter, Loss, Note, NoteKind, Road

@@ -20,10 +20,9 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics import Floats, frozen, place
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.pattern_search import pattern_search
-from scenario_gen.numerics.plane import place
 from scenario_gen.roads import max_repair, share_with_room
 from scenario_gen.situation import separate, Track
 from scenario_gen.types import Note, NoteKind, Road

@@ -27,13 +27,15 @@ from scenario_gen.method.routing.search.planner import (
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Guess
 from scenario_gen.method.routing.task import distances_to_line, off_road, VehicleTask
-from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.numerics.plane import (
+from scenario_gen.numerics import (
     ahead_and_left,
     angle_between,
+    Bools,
     edge_lengths,
+    Floats,
     unit,
     unit_left,
+    wrap_angle,
 )
 from scenario_gen.roads import nearest_pose_with_room
 from scenario_gen.types import Road, Vehicle

@@ -20,8 +20,7 @@ from scipy.linalg import solveh_banded
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.task import monotone_matching, squared_distances, VehicleTask
-from scenario_gen.numerics import Floats, running_sum, wrap_angle
-from scenario_gen.numerics.plane import arc_lengths, edge_lengths, unit
+from scenario_gen.numerics import arc_lengths, edge_lengths, Floats, running_sum, unit, wrap_angle
 
 BENDING_M4_WEIGHT = 4.0**4  # m^4: a kink spreads over about 4 m where a guess holds with weight 1
 PINNED_WEIGHT = 1e15  # of the two end points

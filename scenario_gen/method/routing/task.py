@@ -16,8 +16,7 @@ import shapely
 
 from scenario_gen.method.routing.config import PlanningConfig
 from scenario_gen.method.routing.search.planner import Planner
-from scenario_gen.numerics import Floats, Ints, wrap_angle
-from scenario_gen.numerics.plane import ahead_and_left, arc_lengths
+from scenario_gen.numerics import ahead_and_left, arc_lengths, Floats, Ints, wrap_angle
 from scenario_gen.roads import footprint_fits
 from scenario_gen.types import FittedVehicle, Road, Route, Vehicle
 

@@ -11,8 +11,7 @@ from scipy import ndimage
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
 from scenario_gen.method.sampling.path import BasePath
-from scenario_gen.numerics import Bools, Floats, running_sum
-from scenario_gen.numerics.plane import place, unit
+from scenario_gen.numerics import Bools, Floats, place, running_sum, unit
 from scenario_gen.roads import along_lanes
 from scenario_gen.types import Road, Vehicle
 

@@ -22,10 +22,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from scenario_gen.method.sampling.time_warp import ClockSamples
-from scenario_gen.numerics import Floats, frozen, Ints, running_sum
+from scenario_gen.numerics import arc_lengths, Floats, frozen, Ints, running_sum
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.loops import copy_to
-from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Route
 
 NODE_SPACING_M = 1.0  # a cubic between such nodes is within 0.1 mm of an arc of radius 5 m

@@ -18,11 +18,10 @@ import numpy as np
 
 from scenario_gen.method.validity.cubic import Proof, split_cubic
 from scenario_gen.method.validity.limits import Limits
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Floats, Ints, unit
 from scenario_gen.numerics.boxes import axes, Box, reaches
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, OUT2
-from scenario_gen.numerics.plane import unit
 from scenario_gen.types import Cause, Scenario, together, Violation
 
 _BLOCK_STEPS = 16  # intervals that share one bounding box

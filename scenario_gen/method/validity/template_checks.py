@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from scenario_gen.method.validity.limits import Limits
-from scenario_gen.numerics import Bools, runs
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics import Bools, edge_lengths, runs
 from scenario_gen.numerics.rounding import ROUNDING_M, ROUNDING_S
 from scenario_gen.situation import Abreast, Conflict, MAX_CLEARANCE_CHANGE_M, Wait
 from scenario_gen.types import at_ends, BoundaryStates, Cause, Scenario, Violation

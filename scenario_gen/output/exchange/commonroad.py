@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import angle_between, Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import angle_between
 from scenario_gen.output.exchange.cases import (
     Case,
     evenly_sampled,

@@ -10,8 +10,7 @@ import numpy as np
 from shapely import make_valid, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics import edge_lengths, Floats
 from scenario_gen.types import CARS, DRIVERS, LaneNetwork, Road, RuleKind
 
 SIGN_IDS = {

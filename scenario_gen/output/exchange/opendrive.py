@@ -19,9 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, running_sum
+from scenario_gen.numerics import ahead_and_left, angle_between, Floats, running_sum
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.opendrive_network import Place, RoadNetwork
 from scenario_gen.output.exchange.xml import date_of, rendered

@@ -12,9 +12,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import edge_lengths, Floats, unit_left
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import edge_lengths, unit_left
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.types import LaneNetwork
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.numerics import edge_lengths, unit
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, evenly_sampled, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap

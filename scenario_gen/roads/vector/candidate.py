@@ -14,9 +14,8 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import frozen
+from scenario_gen.numerics import ahead_and_left, frozen, place
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.roads.vector.hypotheses import Hypothesis
 from scenario_gen.roads.vector.lane_graph import LaneGraph
 from scenario_gen.roads.vector.match import Match

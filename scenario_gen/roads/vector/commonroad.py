@@ -18,8 +18,7 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
 from scenario_gen.logs.adapters.commonroad import cycle_of, turns_of
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import place
+from scenario_gen.numerics import Floats, place
 from scenario_gen.roads.vector.drafts import (
     by_id,
     Draft,

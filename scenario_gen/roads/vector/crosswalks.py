@@ -13,9 +13,8 @@ import shapely
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import ahead_and_left, Floats, place, unit_left
 from scenario_gen.numerics.boxes import corners
-from scenario_gen.numerics.plane import ahead_and_left, place, unit_left
 from scenario_gen.roads.vector.drafts import Draft, Faults
 from scenario_gen.roads.vector.sections import OpenDriveRoad
 

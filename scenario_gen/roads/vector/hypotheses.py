@@ -19,10 +19,9 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, place, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.pattern_search import pattern_search
-from scenario_gen.numerics.plane import place
 from scenario_gen.roads.vector.lane_field import lane_sections, LaneField
 from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
 from scenario_gen.situation import FrenetTracks, main_line, pair_crossings, to_frenet, Track

@@ -10,9 +10,8 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Counts, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Counts, Floats, Ints, unit, wrap_angle
 from scenario_gen.numerics.kernels import F, F1, F2, kernel, N2, OUT2
-from scenario_gen.numerics.plane import unit
 from scenario_gen.types import Lane, LaneNetwork
 
 _MAX_FIELD_CELLS = 30_000_000  # of a map; a larger one gets larger cells

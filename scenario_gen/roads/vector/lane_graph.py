@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics import ahead_and_left, Bools, edge_lengths, Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads.vector.lane_field import LaneField
 from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.situation import Track

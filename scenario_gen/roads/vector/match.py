@@ -17,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, runs
+from scenario_gen.numerics import angle_between, Floats, runs
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.numerics.plane import angle_between
 from scenario_gen.roads.vector.hypotheses import Hypothesis
 from scenario_gen.roads.vector.lane_graph import (
     bend_cost,

@@ -15,8 +15,7 @@ from scipy.spatial import KDTree
 import shapely
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, runs
-from scenario_gen.numerics.plane import arc_lengths, edge_lengths
+from scenario_gen.numerics import arc_lengths, edge_lengths, Floats, runs
 from scenario_gen.roads.vector.drafts import (
     Draft,
     MapLanes,

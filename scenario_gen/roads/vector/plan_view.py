@@ -14,8 +14,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.numerics import Floats, Ints, running_sum
-from scenario_gen.numerics.plane import place
+from scenario_gen.numerics import Floats, Ints, place, running_sum
 
 _MAX_LENGTH_M = 1_000_000.0  # of a road
 _MAX_CURVATURE_PER_M = 10.0

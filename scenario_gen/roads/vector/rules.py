@@ -17,8 +17,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.plane import arc_lengths, meeting_shares, unit
+from scenario_gen.numerics import arc_lengths, Bools, Floats, meeting_shares, unit
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.vector.signs import YIELDING_KINDS
 from scenario_gen.situation import Conflict

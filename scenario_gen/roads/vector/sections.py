@@ -16,8 +16,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import unit_left
+from scenario_gen.numerics import Floats, unit_left
 from scenario_gen.roads.vector.drafts import Faults, refuse_too_long, refuse_too_many_lanes
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, ReferenceLine
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS

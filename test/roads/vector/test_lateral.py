@@ -18,7 +18,7 @@ from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.stage import checker_of
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
-from scenario_gen.numerics.plane import unit_left
+from scenario_gen.numerics import unit_left
 from scenario_gen.roads import build_road
 from scenario_gen.situation import abreast_in_lane, clean_tracks, path_offsets
 from scenario_gen.types import Cause, Encounter, Request, Vehicle

@@ -32,8 +32,7 @@ from scenario_gen.method.routing.search.sweep import (
     Scene,
     steering_cost,
 )
-from scenario_gen.numerics import Floats, Ints, wrap_angle
-from scenario_gen.numerics.plane import arc_lengths, edge_lengths, edge_yaws
+from scenario_gen.numerics import arc_lengths, edge_lengths, edge_yaws, Floats, Ints, wrap_angle
 from scenario_gen.roads import (
     footprint_fits,
     free_cells,

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, unit
 from scenario_gen.numerics.kernels import F, kernel, named
-from scenario_gen.numerics.plane import unit
 
 # Words that start to the left; the next number is the mirror image.
 LSL_CODE, LSR_CODE, LRL_CODE = 0, 2, 4

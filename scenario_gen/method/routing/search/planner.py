@@ -11,8 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, sealed
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics import edge_lengths, Floats, sealed
 from scenario_gen.types import Road
 
 NO_POSES = sealed(np.empty((0, 3)))
