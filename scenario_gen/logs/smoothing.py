@@ -22,14 +22,16 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, Floats, Ints, running_sum, runs, wrap_angle
 from scenario_gen.smoothing.motion import Motion, UnreconciledError
-from scenario_gen.smoothing.noise import estimated_noise, residual_noise, white_equivalent
 from scenario_gen.smoothing.path import (
+    estimated_noise,
     fit_path,
     HEADINGS,
     Headings,
     headings_of,
     Path,
+    residual_noise,
     straight_path,
+    white_equivalent,
 )
 
 

@@ -20,7 +20,7 @@ from scenario_gen.numerics import Floats, polyline_of, running_sum, runs
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.situation import Track
 from scenario_gen.situation.evidence import smoothed_speed
-from scenario_gen.situation.waits import MIN_WAIT_S
+from scenario_gen.situation.tracks import MIN_WAIT_S
 
 STATION_STEP_M = 0.25
 RIGHT_ANGLE_RAD = 0.5 * math.pi

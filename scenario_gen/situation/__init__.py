@@ -57,15 +57,18 @@ from scenario_gen.situation.tracks import (
     describe_turn,
     driver_rows,
     drivers_of,
+    find_waits,
     follows_bend,
     is_same_turn,
     manoeuvre_of,
     sharpness_of,
+    STANDSTILL_SPEED_MPS,
     Track,
     turn_of,
+    Wait,
+    WAIT_SPEED_MPS,
 )
 from scenario_gen.situation.traffic_side import mirrored, traffic_side
-from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
     "FOLLOW_UP_S",

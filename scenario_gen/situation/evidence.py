@@ -16,8 +16,7 @@ from scenario_gen.numerics import angle_between, Floats
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.situation.gaps import MIN_HEADWAY_SPEED_MPS
-from scenario_gen.situation.tracks import Track
-from scenario_gen.situation.waits import Wait
+from scenario_gen.situation.tracks import Track, Wait
 from scenario_gen.types import Encounter, Outcome, Reaction, tokens
 
 

@@ -24,8 +24,7 @@ from scenario_gen.situation.evidence import (
 )
 from scenario_gen.situation.gaps import bumper_gaps, is_behind, MIN_HEADWAY_SPEED_MPS
 from scenario_gen.situation.signal_stops import find_signal_stops, SignalExplanations
-from scenario_gen.situation.tracks import Track
-from scenario_gen.situation.waits import Wait
+from scenario_gen.situation.tracks import Track, Wait
 from scenario_gen.situation.yielding import giving_way, waits_for_leader, yielding_evidence
 from scenario_gen.types import Encounter, FOLLOW, Reaction, ReactionGraph
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from scenario_gen.numerics import angle_between, Ints
-from scenario_gen.situation.waits import STANDSTILL_SPEED_MPS, Wait
+from scenario_gen.situation.tracks import STANDSTILL_SPEED_MPS, Wait
 from scenario_gen.types import (
     Encounter,
     FOLLOW,

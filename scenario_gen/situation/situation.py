@@ -14,9 +14,8 @@ from scenario_gen.situation.gaps import lane_gaps, LaneGaps
 from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.reactions import find_reactions
 from scenario_gen.situation.separation import least_gaps, separate_recorded, Separation
-from scenario_gen.situation.tracks import clean_tracks, drivers_of, Track
+from scenario_gen.situation.tracks import clean_tracks, drivers_of, find_waits, Track, Wait
 from scenario_gen.situation.traffic_side import traffic_side
-from scenario_gen.situation.waits import find_waits, Wait
 from scenario_gen.types import Encounter, ReactionGraph, Segmentation
 
 

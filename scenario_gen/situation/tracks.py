@@ -8,6 +8,8 @@ path is therefore fitted to the positions over the distance u = ∫ v dt from th
 (`smoothing.path`), for their estimated noise. If its lateral acceleration is not drivable, more
 noise is assumed. Bends that are too sharp are then eased; they turn as far as before. Standing
 phases collapse to a point, time enters only through u(t), and no sample moves backwards.
+
+A wait is a smoothed speed below 0.5 m/s (on foot 0.2 m/s) for at least 1 s.
 """
 
 from collections.abc import Sequence
@@ -17,6 +19,7 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import (
@@ -28,13 +31,20 @@ from scenario_gen.numerics import (
     Ints,
     polyline_of,
     running_sum,
+    runs,
     unit,
     wrap_angle,
 )
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.smoothing.noise import estimated_noise
-from scenario_gen.smoothing.path import fit_path, GRID_STEP_M
-from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle
+from scenario_gen.smoothing.path import estimated_noise, fit_path, GRID_STEP_M
+from scenario_gen.types import (
+    CAR,
+    Encounter,
+    mask,
+    MAX_PLANNED_CURVATURE_PER_M,
+    Vehicle,
+    VEHICLE_TYPES,
+)
 
 CURVATURE_SHARE = 0.8  # of a type's sharpest curve; for a car 0.2 1/m, nearly its tightest turn
 LATERAL_SHARE = 2.0 / 3.0  # of a type's lateral acceleration; for a car 4 m/s²
@@ -320,3 +330,48 @@ def describe_turn(turn: float) -> str:
         if degrees >= 1.0
         else "goes straight on"
     )
+
+
+WAIT_SPEED_MPS = VEHICLE_TYPES.built_in[CAR].waits_below
+MIN_WAIT_S = 1.0
+SMOOTHING_S = 0.5  # width of the centred moving mean
+STANDSTILL_SPEED_MPS = 0.1  # a vehicle that is faster creeps
+
+
+@dataclass(frozen=True)
+class Wait:
+    """A vehicle waits.
+
+    Attributes:
+        vehicle: index of the vehicle.
+        start: seconds.
+        end: seconds.
+        moves_slowly: whether the vehicle creeps: it stands for less than 1 s.
+    """
+
+    vehicle: int
+    start: float
+    end: float
+    moves_slowly: bool = False
+
+
+def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
+    """Return the waits of all vehicles, ordered by vehicle and time."""
+    width = 2 * round(0.5 * SMOOTHING_S / encounter.dt) + 1
+    smooth = ndimage.uniform_filter1d(encounter.speed, width, mode="nearest")
+    time = encounter.time
+    waits = []
+    for n, vehicle in enumerate(encounter.vehicles):
+        slow = (smooth[n] < vehicle.kind.waits_below) & encounter.is_present[n]
+        for begin, end in runs(slow):
+            start, stop = float(time[begin]), float(time[end - 1])
+            if stop - start >= MIN_WAIT_S - 1e-9:
+                creeps = _creeps(encounter.speed[n, begin:end], time[begin:end])
+                waits.append(Wait(n, start, stop, creeps))
+    return tuple(waits)
+
+
+def _creeps(speed: Floats, time: Floats) -> bool:
+    """Whether less than `MIN_WAIT_S` lies between the first and the last standstill."""
+    standstill = time[speed <= STANDSTILL_SPEED_MPS]
+    return len(standstill) == 0 or bool(np.ptp(standstill) < MIN_WAIT_S - 1e-9)

@@ -27,7 +27,7 @@ from scenario_gen.situation.gaps import (
     MIN_HEADWAY_SPEED_MPS,
     passing,
 )
-from scenario_gen.situation.waits import Wait
+from scenario_gen.situation.tracks import Wait
 from scenario_gen.types import Reaction, YIELD
 
 

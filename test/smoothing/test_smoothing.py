@@ -20,8 +20,14 @@ from scenario_gen.logs.smoothing import (
     standing,
 )
 from scenario_gen.smoothing.motion import Motion
-from scenario_gen.smoothing.noise import estimated_noise, white_equivalent
-from scenario_gen.smoothing.path import fit_path, headings_of, smoothing_spline, straight_path
+from scenario_gen.smoothing.path import (
+    estimated_noise,
+    fit_path,
+    headings_of,
+    smoothing_spline,
+    straight_path,
+    white_equivalent,
+)
 
 CONFIG = LogConfig()
 

@@ -14,8 +14,7 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.losses import find_unused, lost_lights, refuse_lost
+from scenario_gen.method.fitting.config import find_unused, FittingConfig, lost_lights, refuse_lost
 from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.time_warp import Clock, SAMPLE_PERIOD_S
 from scenario_gen.numerics import Floats
-from scenario_gen.situation.waits import STANDSTILL_SPEED_MPS
+from scenario_gen.situation.tracks import STANDSTILL_SPEED_MPS
 from scenario_gen.types import fronts, Scenario, SignalState, TrafficLight
 
 _MAX_SHIFT_S = 1.5  # of the lights of one scenario

@@ -8,6 +8,6 @@ from scenario_gen.method.validity.collision import first_contacts
 from scenario_gen.method.validity.containment import first_exits, Ground
 from scenario_gen.method.validity.cubic import Proof
 from scenario_gen.method.validity.limits import Limits
-from scenario_gen.method.validity.reactions import allowed_gap
+from scenario_gen.method.validity.template_checks import allowed_gap
 
 __all__ = ["Checker", "Ground", "Limits", "Proof", "allowed_gap", "first_contacts", "first_exits"]

@@ -14,12 +14,14 @@ from scenario_gen.method.validity.collision import contact_violations
 from scenario_gen.method.validity.containment import exit_violations, Ground
 from scenario_gen.method.validity.dynamics import is_motion, LARGEST_VALUE_RATIO, motion_violations
 from scenario_gen.method.validity.limits import Limits
-from scenario_gen.method.validity.reactions import broken_reactions, light_violations, tailgaters
 from scenario_gen.method.validity.template_checks import (
+    broken_reactions,
     clearance_violations,
+    light_violations,
     order_violations,
     presence_violations,
     state_violations,
+    tailgaters,
     wait_violations,
 )
 from scenario_gen.numerics import Bools, Floats

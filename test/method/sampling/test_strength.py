@@ -6,8 +6,8 @@
 import numpy as np
 import pytest
 
+from scenario_gen.method.sampling.speed_profile.model import Strength
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.method.sampling.speed_profile.strength import Strength
 
 TIME = np.linspace(0.0, 20.0, 401)
 

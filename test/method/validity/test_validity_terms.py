@@ -12,8 +12,7 @@ from support.motions import FREE, scenario_of, straight, wander
 
 from scenario_gen.method.validity import allowed_gap, Checker, Limits
 from scenario_gen.method.validity.dynamics import Check, MotionLimits, worst_excess
-from scenario_gen.method.validity.reactions import least_gaps
-from scenario_gen.method.validity.template_checks import clearance_violations
+from scenario_gen.method.validity.template_checks import clearance_violations, least_gaps
 from scenario_gen.situation import Abreast, MAX_CLEARANCE_CHANGE_M, Wait
 from scenario_gen.types import Cause, FOLLOW, Reaction, YIELD
 from scenario_gen.types.scenario import BoundaryStates

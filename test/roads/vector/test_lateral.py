@@ -12,7 +12,7 @@ from support.textbook_motions import driven, line, ramps
 
 from scenario_gen import generate
 from scenario_gen.method.fitting import fit_template
-from scenario_gen.method.fitting.losses import LostEncounterError
+from scenario_gen.method.fitting.config import LostEncounterError
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.stage import checker_of
