@@ -49,20 +49,7 @@ def test_any_text_is_valid_or_refused(name, text):
         assert type(value) is type(entry.default)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "[]",
-        "{}",
-        "a: 1\nb: 2\n",
-        "/**: 3",
-        "/**: {ros__parameters: 3}",
-        "/**: {ros__parameters: [1]}",
-        "3",
-        "null",
-    ],
-)
+@pytest.mark.parametrize("text", ["", "[]", "a: 1", "/**: 3", "/**: {ros__parameters: [1]}"])
 def test_file_of_another_form_is_refused(tmp_path, text):
     (tmp_path / "p.yaml").write_text(text)
     with pytest.raises(InputError, match=r"p\.yaml: not a parameter file"):

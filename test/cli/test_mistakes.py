@@ -54,7 +54,6 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*DRIVE, "--ego", "zz"), "no vehicle 'zz' to be the ego; it has a, b"),
     (("drive", "bag"), "(MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower); see"),
     (("export", "bag", "--to", "pdf"), "'pdf' is none of the exports commonroad, openscenario"),
-    (("generate", "my log u.csv"), "did you mean my log ü.csv?"),
     ((*GENERATE, "--for-testing"), "name the vehicle that the planner replaces with --ego"),
     (("find", "nothing"), "holds no scenarios; write them with `scenario-gen batch"),
     ((*GENERATE, "--count", "0"), "'--count': "),

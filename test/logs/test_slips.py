@@ -3,7 +3,6 @@
 
 """Slips in tables, common ones and those that were reported: what can be read is read, and said; the rest says what to do."""
 
-from dataclasses import replace
 import re
 import zipfile
 
@@ -14,7 +13,6 @@ from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.quality import DoubtError
 
 FOOT = 0.3048
 LONG = 9007199254740992
@@ -53,10 +51,6 @@ def nmea(rows):
         whole = np.trunc(out[name])
         out[name] = 100.0 * whole + 60.0 * (out[name] - whole)
     return out
-
-
-def swapped(rows):
-    return geographic(rows).rename(columns={"lat_deg": "lon_deg", "lon_deg": "lat_deg"})
 
 
 def ahead(rows, metres):
@@ -105,11 +99,6 @@ def ngsim(rows):
 READ = {  # name: what is changed, columns, what is said (None: nothing), how the file is written
     "held fixes": (held, "", "position repeated while the vehicle moves"),
     "before 1970": (lambda rows: rows.assign(t_s=rows.t_s - 1006.0), "", "6 s are added to all"),
-    "frames for time": (
-        lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 10).rename(columns={"t_s": "frame"}),
-        "time=frame:10fps",
-        "",
-    ),
     "minutes": (lambda rows: rows.assign(t_min=rows.pop("t_s") / 60.0), "", ""),
     "a left-handed frame": (mirrored, "y=-y_m,heading=-yaw_deg", ""),
     "the front's position": (lambda rows: ahead(rows, 2.4), "point=front", ""),
@@ -126,7 +115,6 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "like feet"),
     "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m × 0 m"),
     "length and width swapped": (lambda rows: sized(rows, 1.8, 4.5), "", "it looks swapped"),
-    "lat and lon swapped": (swapped, "lat=lon_deg,lon=lat_deg", ""),
     "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm", ""),
     "a decimal comma": (
         plain,
@@ -217,16 +205,6 @@ SAID = {  # what is read, but looks otherwise
 def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
     notes = read_log(save(change(crossing()), tmp_path), LogConfig(travel=0.0)).quality.remarks()
     assert sum(said in note for note in notes) == 1
-
-
-def test_doubt_stops_and_remedy_reads_on(tmp_path):
-    rows = crossing(rate=12.0).assign(t_s=lambda own: ((own.t_s - 1e3) * 24).round())
-    path = save(rows, tmp_path)
-    config = LogConfig(travel=0.0)
-    with pytest.raises(DoubtError, match=r"--set log\.columns=time=t_s:24fps"):
-        read_log(path, config)
-    assert read_log(path, replace(config, allow="doubt")).doubts
-    assert not read_log(path, replace(config, columns="time=t_s:24fps")).doubts
 
 
 @pytest.mark.parametrize(

@@ -59,14 +59,6 @@ def test_a_folder_of_transmitted_files(tmp_path):
     assert result.quality.rows == 242
 
 
-def test_with_header_it_is_a_table(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join([",".join(SPMD_COLUMNS), *messages(crossing())]) + "\n")
-    (encounter,) = read_log(path).encounters
-    np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.02)
-    assert [vehicle.id for vehicle in encounter.vehicles] == ["11", "12"]
-
-
 def test_standing_vehicle_has_its_messages_heading(tmp_path):
     rows = crossing()
     rows.loc[rows["vehicle_id"] == "b", ["x_m", "y_m", "speed_mps"]] = (10.0, -12.0, 0.0)

@@ -130,14 +130,6 @@ def test_columns_by_option(tmp_path):
             read_log(path, LogConfig(columns=columns))
 
 
-def test_a_truncated_parquet_file(tmp_path):
-    crossing().to_parquet(tmp_path / "log.parquet")
-    whole = (tmp_path / "log.parquet").read_bytes()
-    (tmp_path / "log.parquet").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=r"log\.parquet cannot be read"):
-        read_log(tmp_path / "log.parquet")
-
-
 def test_paths_that_are_no_logs(tmp_path):
     (tmp_path / "notes.md").write_text("hello")
     (tmp_path / "folder").mkdir()

@@ -53,6 +53,10 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
         "scenario_gen/method/sampling/importance_sampling.py",
         "_MIN_TTC_S = (0.09000000000000001)",
     ): ("a bound of a guide of the proposal: the weights keep the share unbiased"),
+    (
+        "scenario_gen/method/fitting/search.py",
+        "first = ((self._stride // 2)) * self.road.resolution",
+    ): ("the start of a search, half a cell aside: refining in steps of 1 m moves it"),
     ("scenario_gen/method/fitting/state_check.py", "_ROUNDING_M = (0.018000000000000002)"): (
         "rounding takes 7 mm at most; any more keeps the room"
     ),

@@ -11,52 +11,22 @@ Each case is a drive on roads with lanes of 3.5 m, right-hand traffic, with cons
 
 What is recorded of it is what a receiver of basic safety messages records: NavSatFix and TwistStamped per vehicle, with
 coloured GPS noise, a speed sensor off by a percent, jittered stamps, lost and repeated messages.
-
-    python test/logs/synthetic_cases.py [FOLDER]    # writes the three bags, the same bytes every time
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from pathlib import Path
-import sys
 
 import numpy as np
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.bags.vehicles import FIX, TWIST
-from scenario_gen.logs.geodesy import geodetic
-from scenario_gen.logs.synthetic import CASES, RESOURCES
+from scenario_gen.logs.synthetic import CASES
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types import Vehicle
 
 STORES = type_store()
 ORIGIN = (42.3, -83.7)  # degrees; the roads are invented, nothing was recorded there
 START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00:00 UTC
-PERIOD = 0.1  # s between messages
 LANE = 3.5  # m
-COLOURED, COLOUR_TIME, WHITE = (
-    0.3,
-    20.0,
-    0.03,
-)  # m, s, m: GPS noise per axis (first-order Gauss-Markov, and white)
-SPEED_BIAS, SPEED_WHITE, SPEED_QUANTUM = (
-    0.01,
-    0.05,
-    0.02,
-)  # 1, m/s, m/s: a wheel sensor in a basic safety message
-JITTER = 0.015  # s by which stamps are off the clock
-LOST, REPEATED = 0.04, 0.02  # shares of messages
-OUTAGE = 0.6  # s without any message, once per vehicle
 
 
 @dataclass(frozen=True)
@@ -118,13 +88,6 @@ class Drive:
         """The time [s] at which the last phase ends."""
         return self.begin + sum(phase.seconds for phase in self.phases)
 
-    @property
-    def changepoints(self) -> tuple[float, ...]:
-        """Times [s] at which the acceleration changes."""
-        return tuple(
-            (self.begin + np.cumsum([phase.seconds for phase in self.phases[:-1]])).tolist()
-        )
-
 
 def along(x: float, y: float, heading: float, curvature: float, metres: Floats) -> Floats:
     """(K, 3) poses at distances along a straight line or an arc."""
@@ -151,20 +114,6 @@ class Case:
     def duration(self) -> float:
         """Seconds."""
         return min(drive.end for drive in self.drives)
-
-    @property
-    def changepoints(self) -> tuple[float, ...]:
-        """Times [s] at which any vehicle's acceleration changes while all are there."""
-        return tuple(
-            sorted(
-                {
-                    time
-                    for drive in self.drives
-                    for time in drive.changepoints
-                    if 0.0 < time < self.duration
-                }
-            )
-        )
 
 
 def quarter(radius: float, side: int) -> Leg:
@@ -226,82 +175,14 @@ def make_case(name: str) -> Case:
     return Case("synthetic_c", (slows, speeds_up))
 
 
-@dataclass(frozen=True, order=True)
-class Recorded:
-    """One message of the bag, ordered by the time it was received."""
-
-    received_ns: int
-    topic: str
-    type: str
-    data: bytes
-
-
-def record(case: Case, seed: int = 0) -> tuple[Recorded, ...]:
-    """Return the messages that a receiver records of a case, in the order of reception."""
-    messages: list[Recorded] = []
-    for number, drive in enumerate(case.drives):
-        rng = np.random.Generator(
-            np.random.PCG64(np.random.SeedSequence([seed, CASES.index(case.name[-1]), number]))
-        )
-        messages += record_drive(drive, rng)
-    return tuple(sorted(messages))
-
-
-def record_drive(drive: Drive, rng: np.random.Generator) -> Iterator[Recorded]:
-    """Yield the messages of one vehicle: fix and speed at jittered stamps, some lost, some repeated."""
-    count = round((drive.end - drive.begin) / PERIOD) + 1
-    clock = drive.begin + np.arange(count) * PERIOD
-    jitter = np.clip(rng.normal(0.0, JITTER, count), -2.5 * JITTER, 2.5 * JITTER)
-    jitter[[0, -1]] = 0.0
-    state = drive.state(clock + jitter)
-    east, north = state[:, :2].T + coloured_noise(count, rng).T
-    latitude, longitude = np.round(
-        geodetic(np.stack([east, north], axis=-1), ORIGIN), 7
-    )  # as in a basic safety message
-    speed = state[:, 3] * (1.0 + SPEED_BIAS) + np.where(
-        state[:, 3] > 0.0, rng.normal(0.0, SPEED_WHITE, count), 0.0
-    )
-    speed = np.maximum(np.round(speed / SPEED_QUANTUM) * SPEED_QUANTUM, 0.0)
-    lost = rng.random((count, 2)) < LOST
-    outage = rng.uniform(0.3, 0.6) * drive.end
-    lost |= ((clock > outage) & (clock < outage + OUTAGE))[:, None]
-    lost[[0, -1]] = False
-    repeated = rng.random((count, 2)) < REPEATED
-    latency = rng.uniform(0.02, 0.06, (count, 4))
-    header = STORES.types["std_msgs/msg/Header"]
-    for i in range(count):
-        stamp = START_NS + round((clock[i] + jitter[i]) * 1e9)
-        head = header(stamp=nanoseconds_to_time(stamp), frame_id=f"vehicle_{drive.vehicle.id}")
-        messages = (
-            ("fix", FIX, fix_message(head, float(latitude[i]), float(longitude[i]))),
-            ("speed", TWIST, twist_message(head, float(speed[i]))),
-        )
-        for kind, (name, message_type, message) in enumerate(messages):
-            data = bytes(STORES.serialize_cdr(message, message_type))
-            for again in range(0 if lost[i, kind] else 2 if repeated[i, kind] else 1):
-                received = stamp + round(latency[i, kind + 2 * again] * 1e9)
-                yield Recorded(received, f"/vehicle_{drive.vehicle.id}/{name}", message_type, data)
-
-
-def coloured_noise(count: int, rng: np.random.Generator) -> Floats:
-    """(count, 2) GPS noise: a first-order Gauss-Markov process and white noise on top."""
-    keep = np.exp(-PERIOD / COLOUR_TIME)
-    kicks = rng.normal(0.0, COLOURED, (count, 2))
-    coloured = np.empty((count, 2))
-    coloured[0] = kicks[0]
-    for before, i in pairwise(range(count)):
-        coloured[i] = keep * coloured[before] + np.sqrt(1.0 - keep**2) * kicks[i]
-    return coloured + rng.normal(0.0, WHITE, (count, 2))
-
-
 def nanoseconds_to_time(stamp: int) -> object:
     """A builtin_interfaces/Time."""
     return STORES.types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
 
 
 def fix_message(header: object, latitude: float, longitude: float) -> object:
-    """A NavSatFix with the noise's covariance."""
-    variance = COLOURED**2 + WHITE**2
+    """A NavSatFix of a receiver with noise of 0.3 m."""
+    variance = 0.3**2
     return STORES.types[FIX](
         header=header,
         status=STORES.types["sensor_msgs/msg/NavSatStatus"](status=0, service=1),
@@ -321,46 +202,3 @@ def twist_message(header: object, speed: float) -> object:
     twist = STORES.types["geometry_msgs/msg/Twist"]
     linear, angular = vector(x=speed, y=0.0, z=0.0), vector(x=0.0, y=0.0, z=0.0)
     return STORES.types[TWIST](header=header, twist=twist(linear=linear, angular=angular))
-
-
-def write_case(case: Case, folder: Path) -> Path:
-    """Write the case as a rosbag2 folder (MCAP, metadata version 9) named after it; return the bag's path."""
-    bag = folder / case.name
-    forever = QosTime(9223372036, 854775807)
-    qos = Qos(
-        QosHistory.KEEP_LAST,
-        1000,
-        QosReliability.RELIABLE,
-        QosDurability.VOLATILE,
-        forever,
-        forever,
-        QosLiveliness.AUTOMATIC,
-        forever,
-        False,
-    )
-    messages = record(case)
-    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        writer.set_custom_data("origin", "synthetic: made by scenario_gen, not recorded")
-        connections = {
-            topic: writer.add_connection(topic, kind, typestore=STORES, offered_qos_profiles=[qos])
-            for topic, kind in sorted({(message.topic, message.type) for message in messages})
-        }
-        for message in messages:
-            writer.write(connections[message.topic], message.received_ns, message.data)
-    return bag
-
-
-def main(folder: Path = RESOURCES) -> None:
-    """Write all three bags anew."""
-    import shutil
-
-    for name in CASES:
-        case = make_case(name)
-        shutil.rmtree(folder / case.name, ignore_errors=True)
-        bag = write_case(case, folder)
-        size = sum(file.stat().st_size for file in bag.iterdir())
-        print(f"{bag}: {case.duration:g} s, {len(case.drives)} vehicles, {size // 1000} kB")
-
-
-if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:2]))

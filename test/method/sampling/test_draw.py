@@ -3,7 +3,7 @@
 
 """Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 import math
 from types import SimpleNamespace
 
@@ -184,6 +184,7 @@ def stops(b):
 
 
 def test_deviations_have_the_stated_standard_deviation():
+    assert set(astuple(NoiseScale())) == {1.0}, "no factor unless a level asks for it"
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
     assert some.samples[0].paths.curve[:, middle, 1].std() == pytest.approx(
