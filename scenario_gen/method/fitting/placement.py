@@ -84,7 +84,7 @@ def place_given(
 
     If a route of line, arc and line can be drawn between the two, eq 9 applies along it: the
     recorded arc lengths times s. Otherwise it is the similarity of the plane. A vehicle with too
-    short a chord gets rotation and scale from all vehicles (Umeyama 1991).
+    short a chord is turned as its start is, with s = 1.
 
     Args:
         situation: of the recording.
@@ -110,7 +110,6 @@ def place_given(
         speed = _end_speeds(encounter, base.scale[:, None])
         base_ends = np.concatenate((poses, speed[..., None]), axis=-1)
         ends = np.where(is_given[..., None], ends, base_ends)
-    joint = _Similarity.of_all(tracks, ends)
     placed: list[Track] = []
     scale, moved = np.ones(len(tracks)), np.zeros(len(tracks))
     notes = [] if base is None else list(base.notes)
@@ -119,7 +118,7 @@ def place_given(
             placed.append(base.tracks[n])
             scale[n], moved[n] = base.scale[n], base.moved[n]
             continue
-        placed_track, scale[n], method = _placed(track, ends[n], joint, road, config)
+        placed_track, scale[n], method = _placed(track, ends[n], road, config)
         placed.append(placed_track)
         notes.append(_note(track, is_given[n], method))
     given = np.where(np.any(is_given, axis=1, keepdims=True)[..., None], ends, np.nan)
@@ -138,40 +137,8 @@ def _end_speeds(encounter: Encounter, scale: Floats | float = 1.0) -> Floats:
     return np.where(speed < STANDING_SPEED_MPS, 0.0, speed)
 
 
-@dataclass(frozen=True)
-class _Similarity:
-    """A rotation [rad] and a scale."""
-
-    rotation: float
-    scale: float
-
-    @classmethod
-    def of_all(cls, tracks: tuple[Track, ...], states: Floats) -> "_Similarity":
-        """Return the least-squares similarity (det R = +1) from all starts and ends to others."""
-        source = np.concatenate([track.poses[[0, -1]] for track in tracks])
-        target = states.reshape(-1, 4)
-        u = source[:, :2] - source[:, :2].mean(axis=0)
-        v = target[:, :2] - target[:, :2].mean(axis=0)
-        spread = np.square(u).sum()
-        if all(track.still for track in tracks) or spread < 1e-6:
-            turn = target[:, 2] - source[:, 2]
-            return cls(float(np.arctan2(np.sin(turn).sum(), np.cos(turn).sum())), 1.0)
-        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum())
-        cosine = float((u * v).sum())
-        return cls(float(np.arctan2(sine, cosine)), float(np.hypot(sine, cosine) / spread))
-
-    @classmethod
-    def of_chords(cls, u: Floats, v: Floats) -> "_Similarity":
-        """Return the similarity that maps chord u (2,) [m] to v.
-
-        Source: eq 8a, with the sign of the angle.
-        """
-        rotation = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
-        return cls(rotation, float(np.hypot(*v) / np.hypot(*u)))
-
-
 def _placed(
-    track: Track, ends: Floats, joint: _Similarity, road: Road, config: FittingConfig
+    track: Track, ends: Floats, road: Road, config: FittingConfig
 ) -> tuple[Track, float, str]:
     """Return the track from a start to a goal, (2, 4) states, its scale, and the method."""
     if track.still:
@@ -185,7 +152,7 @@ def _placed(
             curve = route.cut(0.0, route.length, 0.25)
             on_route = replace(track, curve=curve, progress=frozen(scale * track.progress))
             return on_route, scale, f"along a drawn route (s = {scale:.2f})"
-    return _placed_by_similarity(track, ends, joint, config)
+    return _placed_by_similarity(track, ends, config)
 
 
 def _placed_wait(track: Track, ends: Floats) -> Track:
@@ -206,24 +173,25 @@ def _placed_wait(track: Track, ends: Floats) -> Track:
 
 
 def _placed_by_similarity(
-    track: Track, ends: Floats, joint: _Similarity, config: FittingConfig
+    track: Track, ends: Floats, config: FittingConfig
 ) -> tuple[Track, float, str]:
     """Return the track by a similarity of the plane, its scale, and the method.
 
-    Source: eqs 8b and 9; q = s R (p - p_start) + q_start.
+    Source: eq 8a with the sign of the angle, eqs 8b and 9; q = s R (p - p_start) + q_start.
 
     Raises:
         RefusedError: the scale is out of range.
     """
     start, goal = ends[:, :2]
-    chord = (track.poses[-1] - track.poses[0])[:2]
-    similarity, method = joint, "rotation and scale from all vehicles"
-    if np.hypot(*chord) >= _MIN_CHORD_M:
-        similarity, method = _Similarity.of_chords(chord, goal - start), "similarity"
-    scale, rotation = similarity.scale, similarity.rotation
+    chord, wanted = (track.poses[-1] - track.poses[0])[:2], goal - start
+    recorded, requested = float(np.hypot(*chord)), float(np.hypot(*wanted))
+    method, scale, rotation = "turned as its start", 1.0, ends[0, 2] - track.poses[0, 2]
+    if recorded >= _MIN_CHORD_M:
+        method, scale = "similarity", requested / recorded
+        rotation = np.arctan2(chord[0] * wanted[1] - chord[1] * wanted[0], chord @ wanted)
     subject = (
-        f"vehicle {track.vehicle.id} (recorded chord {np.hypot(*chord):.1f} m, requested "
-        f"{np.hypot(*(goal - start)):.1f} m)"
+        f"vehicle {track.vehicle.id} (recorded chord {recorded:.1f} m, requested "
+        f"{requested:.1f} m)"
     )
     if not config.accepts(scale):
         raise RefusedError(

@@ -84,14 +84,14 @@ def _cross_sections_of(name: str, map_lanes: MapLanes) -> dict[str, tuple[Draft,
                 first = sections[draft.id][0].place
                 raise InputError(f"{draft.place}: second lane {draft.id}, first at {first}")
             left, right = draft.left, draft.right
-            if not draft.paired:
-                left, right = cross_sections(left, right, draft.place)
             longest = max(float(edge_lengths(border[:, :2]).sum()) for border in (left, right))
             if not longest <= MAX_SECTIONS_COUNT * SECTION_LENGTH_M:  # true for NaN
                 raise InputError(
                     f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; "
                     "check the coordinates"
                 )
+            if not draft.paired:
+                left, right = cross_sections(left, right, draft.place)
             total += max(len(left), math.ceil(longest / SECTION_LENGTH_M))
             refuse_too_long(total, f"map {name}")
             sections[draft.id] = draft, left, right
@@ -119,7 +119,7 @@ def cross_sections(left: Floats, right: Floats, place: str) -> tuple[Floats, Flo
     All vertices of both are kept. A third column, the height, is interpolated likewise.
 
     Raises:
-        InputError: a border has no length, or is too long.
+        InputError: a border has no length.
     """
     borders, shares, longest = [], [], 0.0
     for side, border in (("left", left), ("right", right)):
@@ -136,9 +136,6 @@ def cross_sections(left: Floats, right: Floats, place: str) -> tuple[Floats, Flo
         borders.append(points)
         shares.append(length / length[-1])
         longest = max(longest, float(length[-1]))
-    if longest > MAX_SECTIONS_COUNT * SECTION_LENGTH_M:
-        raise InputError(f"{place}: a border of {longest / 1000.0:.0f} km; check the coordinates")
-
     even = np.linspace(0.0, 1.0, math.ceil(longest / SECTION_LENGTH_M) + 1)
     share = np.unique(np.concatenate((*shares, even)))
     share = share[np.concatenate(([True], np.diff(share) > 1e-9))]

@@ -339,6 +339,22 @@ def test_requested_ends_are_met_exactly():
         )
 
 
+def test_returning_vehicle_turns_with_its_start():
+    speed = np.full(100, 6.0)
+    circle = turn(0.0, 0.0, 0.0, 0.0, 2.0 * np.pi, 59.4 / (2.0 * np.pi))
+    encounter = encounter_of(driven(circle, speed), driven(straight(40.0, 30.0, 0.0), speed))
+    starts = np.array([[100.0, 100.0, np.pi / 2.0, 6.0], [30.0, 30.0, 0.3, 6.0]])
+    goals = starts.copy()
+    goals[1, :2] += 59.4 * np.array([np.cos(0.3), np.sin(0.3)])
+    goals[0, 2] += 2.0 * np.pi
+    request = requested(encounter, starts, goals)
+    road = grid(np.ones((1000, 1000), dtype=bool))
+    fit = fit_template(encounter, every(encounter), road, request=request)
+    assert [f.scale for f in fit.fitted] == pytest.approx([1.0, 1.0], abs=0.01)
+    half_way = fit.fitted[0].path[len(fit.fitted[0].path) // 2]
+    assert half_way[:2] == pytest.approx([100.0 - 2.0 * 59.4 / (2.0 * np.pi), 100.0], abs=0.5)
+
+
 def test_waiting_vehicle_cannot_be_sent_away():
     encounter = encounter_of(
         driven(straight(-30.0, 0.0, 0.0), np.full(100, 6.0)),
