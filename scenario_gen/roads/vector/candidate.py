@@ -43,6 +43,7 @@ _MAX_FORCED_LATERAL_MPS2 = (
     4.2  # a little less than scenarios may have; else other scales are tried
 )
 _MIN_CLEARANCE_M = 0.1  # between placed footprints, if the recorded ones are as near
+_BENT_SHARE = 0.5  # of a recorded turn that a path has; with less, other scales do not help
 _SIDEWAYS_SHARE = 0.1  # of a shift, if moving vehicles along their lanes is not enough
 _OVERLAP_M = 5.0  # between two vehicles of which one may be above the other
 _SCALED_LOSSES = frozenset(("conflict", "order", "following"))
@@ -172,7 +173,8 @@ class Candidate:
     def depends_on_scale(self) -> bool:
         """Whether another scale may lose nothing: it changes times and turns, not lanes."""
         if self.surely_lost:
-            return not self.match.lost_crossings
+            bent = (abs(turn) > _BENT_SHARE * abs(recorded) for recorded, turn in self._lost_turns)
+            return not self.match.lost_crossings and all(bent)
         return all(loss.kind in _SCALED_LOSSES for loss in self.refused_losses)
 
     @property
@@ -183,12 +185,15 @@ class Candidate:
     @cached_property
     def surely_lost(self) -> int:
         """How many crossings and turns are lost; other losses are expensive to find."""
-        turns = sum(
-            not is_same_turn(turn_of(track), path.turn)
-            for track, path in zip(self.task.drivers, self.match.paths, strict=True)
-            if not follows_bend(track)
-        )
-        return self.match.lost_crossings + turns * ("turn" not in self.task.limits.allowed)
+        turns = len(self._lost_turns) * ("turn" not in self.task.limits.allowed)
+        return self.match.lost_crossings + turns
+
+    @cached_property
+    def _lost_turns(self) -> list[tuple[float, float]]:
+        """The recorded turns [rad] that are lost, and those of their paths."""
+        driven = zip(self.task.drivers, self.match.paths, strict=True)
+        turns = [(turn_of(track), path.turn) for track, path in driven if not follows_bend(track)]
+        return [each for each in turns if not is_same_turn(*each)]
 
     @cached_property
     def losses(self) -> tuple[Loss, ...]:
