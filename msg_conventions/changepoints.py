@@ -11,7 +11,6 @@ one row per vehicle and one column per sample: x, y, z [m, float32], vehicle, pr
 stamp of their tracks. QoS: reliable, transient_local, depth 1.
 """
 
-from collections.abc import Mapping
 import math
 
 import numpy as np
@@ -22,7 +21,7 @@ from msg_conventions.diagnostics import Level, Status
 from msg_conventions.layouts import CLOUD
 from msg_conventions.tracks import encode_samples, FRAME
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Encounter, Segmentation
+from scenario_gen.types import describe_segments, Encounter, Segmentation
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 POINT = np.dtype(
@@ -49,8 +48,7 @@ def decode_changepoints(
 ) -> Segmentation:
     """Return the segmentation of a message and its tracks, with a new primitive for every segment.
 
-    Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later
-    stage needs them.
+    Shared labels and probabilities are in `posterior`; no later stage needs them.
 
     Raises:
         InputError: the message is damaged, bears another stamp, or has a changepoint off the
@@ -71,7 +69,7 @@ def decode_changepoints(
         )
     marks = np.zeros(samples)
     marks[index] = 1.0
-    descriptions = tuple(f"segment {k}" for k in range(len(index) + 1))
+    descriptions = describe_segments(encounter, index)
     return Segmentation(np.cumsum(marks).astype(np.int64), index, marks, descriptions)
 
 
@@ -106,7 +104,7 @@ def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
 def decode_posterior(
     data: bytes, descriptions: tuple[str, ...] = (), source: str = "posterior"
 ) -> Segmentation:
-    """Return the segmentation; its sentences for people travel on the diagnostics.
+    """Return the segmentation with these sentences for people.
 
     Raises:
         InputError: the message is damaged or not of this convention.
@@ -138,16 +136,4 @@ def segmentation_status(segmentation: Segmentation, node: str, duration: float) 
     values |= {} if math.isnan(segmentation.r_hat) else {"r_hat": f"{segmentation.r_hat:.3g}"}
     return Status(
         f"{node}: segmentation", Level.WARN if remark else Level.OK, remark or message, values
-    )
-
-
-def segment_descriptions(statuses: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """Return the sentences of such a status, one for each segment.
-
-    `statuses` are key-values by subject.
-    """
-    return tuple(
-        text
-        for key, text in statuses.get("segmentation", {}).items()
-        if key.startswith("segment.")
     )

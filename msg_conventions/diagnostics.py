@@ -11,14 +11,12 @@ as the value `template_stamp`.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
-import re
 
 from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import DIAGNOSTICS
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 TEMPLATE = "template_stamp"
-_DECIMAL_STAMP = re.compile(r"(\d{0,19})\.(\d{9})", re.ASCII)
 
 
 class Level(IntEnum):
@@ -101,9 +99,3 @@ def decimal_stamp(stamp_ns: int) -> str:
 def of_template(status: Status, stamp_ns: int) -> Status:
     """Return a status with its template's stamp as the value `template_stamp`."""
     return replace(status, values={**status.values, TEMPLATE: decimal_stamp(stamp_ns)})
-
-
-def template_of(status: Status, stamp_ns: int) -> int:
-    """Return the stamp [ns] of a status's template; by default `stamp_ns`, its message's."""
-    match = _DECIMAL_STAMP.fullmatch(status.values.get(TEMPLATE, ""))
-    return int(match[1] + match[2]) if match else stamp_ns

@@ -101,6 +101,7 @@ from scenario_gen.types.scenario import (
     Violation,
     with_witness,
 )
+from scenario_gen.types.segments import describe_segments
 from scenario_gen.types.signal_schedule import SignalSchedule, SignalState
 from scenario_gen.types.target import (
     join_pieces,
@@ -220,6 +221,7 @@ __all__ = [
     "canonical_presence",
     "causes_in_words",
     "cut",
+    "describe_segments",
     "formatted",
     "fronts",
     "height",

@@ -22,7 +22,7 @@ from rosbags.typesys import get_typestore, Stores
 from support.bag_examples import hand_made_run
 
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
+from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.writer import BagWriter
@@ -86,7 +86,7 @@ def read_bag(path: Path) -> None:
         lambda: read_recording(path).provenance,
     ):
         with_errors(each)
-    read_scenario_set(path)
+    load(path)
 
 
 def with_errors(call: Callable[[], object]) -> None:

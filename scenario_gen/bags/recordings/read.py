@@ -18,11 +18,7 @@ import numpy as np
 
 from msg_conventions import documents
 from msg_conventions.cdr import stamp_of
-from msg_conventions.changepoints import (
-    decode_changepoints,
-    decode_posterior,
-    segment_descriptions,
-)
+from msg_conventions.changepoints import decode_changepoints, decode_posterior
 from msg_conventions.documents import DOCUMENTS, hash_of, head_of, LANES, PLAN
 from msg_conventions.ego import WITNESS
 from msg_conventions.fits import decode_plan
@@ -31,7 +27,6 @@ from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, Sce
 from msg_conventions.scenarios import messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
-from scenario_gen.bags.recordings.template import template_statuses
 from scenario_gen.bags.storage.bag import naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.messages import BagMessage
@@ -43,7 +38,6 @@ from scenario_gen.types import (
     GenerationResult,
     Road,
     Route,
-    ScenarioSet,
     Segmentation,
 )
 
@@ -58,7 +52,6 @@ __all__ = [
     "ScenarioEntry",
     "load",
     "read_recording",
-    "read_scenario_set",
 ]
 
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
@@ -67,14 +60,11 @@ _TEMPLATE_TOPICS = (
     r"tracks|changepoints|map|fit(?:/info)?|road/(?:entries|exits|lanes)|vehicle_\w+/route"
     r"|ego/(?:start|goal)"
 )
-_OTHER_TOPICS = "posterior|ego/witness|scenarios|scenarios/info|diagnostics"
+_OTHER_TOPICS = "posterior|ego/witness|scenarios|scenarios/info"
 _TEMPLATE_TOPIC = re.compile(_TEMPLATE_TOPICS, re.DOTALL)
 _TOPIC = re.compile(
     rf"(?:(?P<namespace>.*?)/)?(?P<topic>{_TEMPLATE_TOPICS}|{_OTHER_TOPICS})", re.DOTALL
 )
-
-Statuses = Mapping[str, Mapping[str, str]]
-"""Key-values of diagnostics, by subject."""
 
 Roads = dict[tuple[str, bytes | None, str], Road]
 """The roads of a bag by map hash, lanes and name: each is large, and decoded once."""
@@ -135,12 +125,9 @@ def read_recording(
             _refuse_draft(path, match["topic"], message.type)
             by_topic = messages.setdefault(match["namespace"] or "", {})
             by_topic.setdefault(match["topic"], []).append(message)
-    # /diagnostics is one topic for the nodes of all namespaces.
-    diagnostics = [message.data for message in messages.get("", {}).get("diagnostics", ())]
     roads: Roads = {}
     namespaces = {
-        name: Namespace(path, name, by_topic, diagnostics, roads)
-        for name, by_topic in sorted(messages.items())
+        name: Namespace(path, name, by_topic, roads) for name, by_topic in sorted(messages.items())
     }
     return Recording(path, namespaces)
 
@@ -157,7 +144,7 @@ def _refuse_draft(path: Path, topic: str, kind: str) -> None:
 class Namespace(RecordedScenarios):
     """The messages of one namespace of a bag.
 
-    Properties for display (`statuses`, `segmentation`, `fit`, `entries`, …) omit missing and
+    Properties for display (`segmentation`, `fit`, `entries`, …) omit missing and
     damaged messages; functions for checking or generating scenarios raise an error instead.
     """
 
@@ -166,11 +153,9 @@ class Namespace(RecordedScenarios):
         path: Path,
         name: str,
         messages: Mapping[str, Sequence[BagMessage]],
-        shared: Sequence[bytes],
         roads: "Roads",
     ) -> None:
-        """Use messages by topic; /diagnostics and roads are shared by all namespaces of a bag."""
-        self._shared = shared
+        """Use messages by topic; roads are shared by all namespaces of a bag."""
         self._roads = roads
         super().__init__(path, name, messages)
 
@@ -307,7 +292,7 @@ class Namespace(RecordedScenarios):
         inputs = self.template_messages(entry, entry.stamp).values()
         return (*inputs, *witness, *parts, info, closing)
 
-    # To look at: the newest template and the diagnostics about it.
+    # To look at: the newest template.
 
     @cached_property
     def encounter(self) -> Encounter:
@@ -318,14 +303,6 @@ class Namespace(RecordedScenarios):
         return (
             replace(encounter, source=self.summaries[-1].source) if self.summaries else encounter
         )
-
-    @cached_property
-    def statuses(self) -> Statuses:
-        """The newest diagnostics about the newest template."""
-        stamp_ns = self.encounter.start_ns
-        data = (message.data for message in self._recorded.get("diagnostics", ()))
-        shared = template_statuses(self._shared, stamp_ns, f"{self.name}/")
-        return shared | template_statuses(data, stamp_ns)
 
     @cached_property
     def road_name(self) -> str:
@@ -341,7 +318,7 @@ class Namespace(RecordedScenarios):
 
     @cached_property
     def segmentation(self) -> Segmentation:
-        """The newest segmentation, with labels, probabilities and descriptions if recorded.
+        """The newest segmentation, with labels and probabilities if recorded.
 
         Raises:
             InputError: the changepoints are damaged or of another template.
@@ -354,19 +331,14 @@ class Namespace(RecordedScenarios):
                 np.zeros(steps, dtype=np.int64), none, np.zeros(steps), ("the whole encounter",)
             )
         known = decode_changepoints(changepoints[-1], self.encounter, self.where("changepoints"))
-        texts = segment_descriptions(self.statuses)
-        if len(texts) != len(known.descriptions):
-            texts = known.descriptions
         for data in reversed(self.data("posterior")):
-            try:
-                whole = decode_posterior(data, texts)
-            except InputError:
-                continue
-            if len(whole.labels) == len(known.labels) and np.array_equal(
-                whole.changepoints, known.changepoints
-            ):
-                return whole
-        return Segmentation(known.labels, known.changepoints, known.changepoint_probability, texts)
+            with suppress(InputError):
+                whole = decode_posterior(data, known.descriptions)
+                if len(whole.labels) == len(known.labels) and np.array_equal(
+                    whole.changepoints, known.changepoints
+                ):
+                    return whole
+        return known
 
     @cached_property
     def fit(self) -> tuple[Fit | None, tuple[Route, ...]]:
@@ -379,21 +351,6 @@ class Namespace(RecordedScenarios):
                 ):
                     return plan.fit(self.encounter), plan.routes
         return None, ()
-
-
-def read_scenario_set(
-    path: Path, namespace: str = "", config: BagConfig = BagConfig()
-) -> ScenarioSet:
-    """Return scenarios and counts of the last request in a bag.
-
-    Raises:
-        InputError: the bag cannot be read, no request was closed, or a scenario is missing.
-    """
-    recorded = read_recording(path, config, (SCENARIOS, INFO)).namespaces.get(namespace)
-    if recorded is None:
-        raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
-    with naming_bag(path):
-        return recorded.scenario_set()
 
 
 def load(

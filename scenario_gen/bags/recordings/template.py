@@ -1,14 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A template from its messages: tracks, changepoints, road, plan and diagnostics."""
+"""A template from its messages: tracks, changepoints, road and plan."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics, TEMPLATE, template_of
 from msg_conventions.documents import LANES, PLAN
 from msg_conventions.fits import decode_plan
 from msg_conventions.roads import decode_map
@@ -36,28 +35,3 @@ def decode_template(messages: Mapping[str, bytes]) -> Planned:
             f"{PLAN}: frame {plan.frame_id!r} is not that of the map, {road.frame_id!r}"
         )
     return Planned(encounter, segmentation, road, plan.fit(encounter), plan.routes)
-
-
-def template_statuses(
-    messages: Iterable[bytes], stamp_ns: int, nodes: str = "/"
-) -> dict[str, Mapping[str, str]]:
-    """Return the key-values of diagnostics about one template, by subject; the last ones count.
-
-    The subject of "/planner: fit" is "fit".
-
-    Args:
-        messages: those of /diagnostics.
-        stamp_ns: stamp of the template.
-        nodes: prefix of the full names of the nodes.
-    """
-    by_subject: dict[str, Mapping[str, str]] = {}
-    for data in messages:
-        try:
-            stamp, statuses = decode_diagnostics(data)
-        except InputError:
-            continue
-        for status in statuses:
-            if template_of(status, stamp) == stamp_ns and status.name.startswith(nodes):
-                values = {key: value for key, value in status.values.items() if key != TEMPLATE}
-                by_subject[status.name.partition(": ")[2]] = values
-    return by_subject

@@ -22,13 +22,14 @@ import yaml
 from msg_conventions.scenario_info import INFO
 from msg_conventions.scenarios import messages_of
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags.recordings.read import load, read_recording, read_scenario_set
+from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import bag_topics, bag_warnings, read_messages
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.types import describe_segments
 from scenario_gen.types.generation import GenerationResult
 
 
@@ -112,7 +113,7 @@ def test_repeated_request_counts_once(run, tmp_path, indices, begun):
     for k, message in enumerate([*whole, *told[:begun], *told]):
         bag.write(message.topic, message.data, whole[0].stamp_ns + k)
     bag.close()
-    got = read_scenario_set(tmp_path / "twice")
+    got = load(tmp_path / "twice").generated
     assert [s.index for s in got.scenarios] == list(indices)
     assert [s.position.tobytes() for s in got.scenarios] == [
         s.position.tobytes() for s in run.generated.scenarios
@@ -250,6 +251,8 @@ def test_saved_result_is_loaded_unchanged(run, tmp_path):
         np.array_equal(found.segmentation.changepoints, run.segmentation.changepoints)
         and not found.evaluation.rows
     )
+    described = describe_segments(found.encounter, run.segmentation.changepoints)
+    assert found.segmentation.descriptions == described
 
 
 def test_folder_without_result_is_refused(run, tmp_path):
