@@ -227,10 +227,8 @@ def test_player_ends_when_all_is_heard(start, client):
     ]
     topics = sorted({f"/{m.topic.lstrip('/')}" for m in played})
     client.hear("/clock", *topics)
-    began = time.monotonic()
-    process = start("player", bag=bag, paused=True, rate=1000.0, clock=True, clock_rate=10.0)
+    process = start("player", bag=bag, paused=True, rate=1000.0, clock=True)
     client.wait("/clock", 20)  # while it is paused
-    assert time.monotonic() - began > 1.8, "ten messages a second"
     for topic in topics:
         client.until(
             lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}"

@@ -22,7 +22,7 @@ from mcap.stream_reader import breakup_chunk, MAGIC_SIZE, StreamReader
 from scenario_gen.bags.storage.config import ReadBudget
 from scenario_gen.bags.storage.messages import BagMessage, BagTopic
 from scenario_gen.bags.storage.metadata import quality_of
-from scenario_gen.base.documents import parse_yaml, shown
+from scenario_gen.base.documents import parse_yaml
 from scenario_gen.base.errors import describe, guarded, InputError
 
 _MAX_STAMP_NS = 2**63  # rosbag2's stamps are signed
@@ -42,7 +42,7 @@ class McapFile:
             budget: bounds of reading it.
 
         Raises:
-            InputError: it is larger than the bounds allow, or a topic's type is missing.
+            InputError: it is larger than the bounds allow.
         """
         self.missing = ""
         self._stream = stream
@@ -154,18 +154,10 @@ class McapFile:
         channels: Mapping[int, Channel],
         counts: Mapping[int, int],
     ) -> list[BagTopic]:
-        """Return the channels with their types and numbers of messages.
-
-        Raises:
-            InputError: the type of a channel is missing.
-        """
+        """Return the channels with their types, "" if one is missing, and numbers of messages."""
         topics = []
         for number, channel in channels.items():
             schema = schemas.get(channel.schema_id)
-            if channel.schema_id and schema is None:
-                raise InputError(
-                    f"{self._path}: damaged, the type of topic {shown(channel.topic)} is missing"
-                )
             quality = quality_of(_profiles(channel.metadata.get("offered_qos_profiles", "")))
             kind, count = schema.name if schema else "", counts.get(number, 0)
             topics.append(

@@ -46,10 +46,10 @@ class BagTime:
             self.ended = True
             self._changed.notify_all()
 
-    def begin(self, offset: float) -> None:
-        """Begin a round at an offset [s]."""
+    def begin(self) -> None:
+        """Begin a round."""
         with self._changed:
-            self._elapsed = self._due = offset
+            self._elapsed = self._due = 0.0
             self._updated_at = monotonic()
 
     def wait(self, due: float) -> bool:

@@ -8,16 +8,14 @@ the bag and let it pass.
 
 Each topic has the quality of service of its recording, or the one that the parameters
 `qos_overrides./topic.publisher.reliability` and its siblings set; the history of a volatile topic
-is longer. Playing begins once the topics have subscribers, or after seconds without. With an
-offset, the earlier messages of latched topics are published first. With `clock`, /clock has the
-bag's time for nodes with `use_sim_time`, also while the player is paused, in place of the bag's
-own /clock. Messages that are late, by up to a second, are caught up with. The player ends when
-all is played and acknowledged, unless it is to `loop`, or to `stay` for late subscribers of
-latched topics.
+is longer. Playing begins once the topics have subscribers, or after seconds without. With `clock`,
+/clock has the bag's time for nodes with `use_sim_time`, also while the player is paused, in place
+of the bag's own /clock. Messages that are late, by up to a second, are caught up with. The player
+ends when all is played and acknowledged, unless it is to `loop`, or to `stay` for late subscribers
+of latched topics.
 """
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -34,7 +32,7 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
 from scenario_gen.bags.storage.bag import open_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.bags.storage.messages import BagMessage, BagTopic
+from scenario_gen.bags.storage.messages import BagTopic
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.bag_time import BagTime
@@ -55,6 +53,7 @@ from scenario_gen.types import Quality
 UNBOUNDED = BagConfig(most_bytes=2**62)  # messages are published and dropped: any size will do
 END_PATIENCE_S = 5.0  # for subscribers to receive the last messages
 POLL_S = 0.01  # between two looks at subscribers
+CLOCK_PERIOD_S = 0.025  # real time between two messages on /clock, as of rosbag2's player
 MATCH_S = 1.0  # for the topics to get subscribers once one of them has one
 FIRST_MATCH_S = 5.0  # for that first one
 USUAL_DEPTH_COUNT = 10  # messages that a subscription stores if its node does not say more
@@ -75,9 +74,6 @@ class Config(Parameters):
     rate: float = parameter(
         1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0
     )
-    start_offset: float = parameter(
-        0.0, "time in the bag at which a round begins", unit="s", low=0.0
-    )
     loop: bool = parameter(False, "begin again at the end")
     stay: bool = parameter(
         False, "keep running at the end, so that late subscribers get latched topics"
@@ -86,9 +82,6 @@ class Config(Parameters):
         False, "wait for ~/resume_playing before the first message", fixed=True
     )
     clock: bool = parameter(False, "publish /clock", fixed=True)
-    clock_rate: float = parameter(
-        40.0, "messages on /clock in real time", unit="Hz", low=1.0, high=1000.0, fixed=True
-    )
     patience: float = parameter(
         60.0,
         "time without acknowledgement after which a subscriber is no longer waited for; 0: wait "
@@ -134,7 +127,7 @@ class Player(Node):  # type: ignore[misc]
         self._clock_publisher = None
         if self.parameters.config.clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
-            create_steady_timer(self, 1.0 / self.parameters.config.clock_rate, self._publish_clock)
+            create_steady_timer(self, CLOCK_PERIOD_S, self._publish_clock)
         offer_trigger(self, "~/pause_playing", partial(self._pause, paused=True))
         offer_trigger(self, "~/resume_playing", partial(self._pause, paused=False))
 
@@ -245,15 +238,16 @@ class Player(Node):  # type: ignore[misc]
         self.done = True
 
     def _play_round(self, bag: Path) -> None:
-        """Play the bag from the offset to its end, or to the node's end."""
-        start = self.parameters.config.start_offset
-        self._time.begin(start)
-        for message, elapsed in self._from_offset(bag, start):
-            if not self._time.wait(elapsed):
+        """Play the bag to its end, or to the node's end."""
+        self._time.begin()
+        for message in read_messages(bag, lambda topic: topic in self._offered, UNBOUNDED):
+            if self._begin_ns is None:
+                self._begin_ns = message.stamp_ns
+            if not self._time.wait((message.stamp_ns - self._begin_ns) * 1e-9):
                 return
             self._publish(message.topic, message.data)
         if self.parameters.config.loop:
-            self._time.wait(start + MIN_ROUND_S)
+            self._time.wait(MIN_ROUND_S)
 
     def _publish(self, topic: str, data: bytes) -> None:
         """Publish once no pending message is overwritten; this may slow the replay down."""
@@ -275,28 +269,6 @@ class Player(Node):  # type: ignore[misc]
             f"pace of {topic}",
             {"count": str(count)},
         )
-
-    def _from_offset(self, bag: Path, start: float) -> Iterator[tuple[BagMessage, float]]:
-        """Yield the messages from `start` [s] on, each with its time in the bag.
-
-        Publish the last ones of latched topics before it first.
-        """
-        latched: dict[str, deque[bytes]] = {}
-        begin_ns: int | None = None
-        for message in read_messages(bag, lambda topic: topic in self._offered, UNBOUNDED):
-            if begin_ns is None:
-                self._begin_ns = begin_ns = message.stamp_ns
-            elapsed = (message.stamp_ns - begin_ns) * 1e-9
-            if elapsed < start:
-                quality = self._offered[message.topic].topic.quality
-                if quality.transient_local:
-                    kept = latched.setdefault(message.topic, deque(maxlen=quality.depth))
-                    kept.append(message.data)
-                continue
-            for topic in list(latched):
-                for data in latched.pop(topic):
-                    self._publish(topic, data)
-            yield message, elapsed
 
     def _report_progress(self) -> None:
         """Report the time in the bag, each second."""
