@@ -31,8 +31,6 @@ TYPE = "std_msgs/msg/String"
 HASH_DIGITS = 12
 LANES, PLAN = "road/lanes", "fit/info"
 DOCUMENTS = (LANES, PLAN)
-TEMPLATE_HASH = "template_hash"
-MAP_HASH = "map_hash"
 _DAMAGES = (AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError)
 Document = TypeVar("Document")
 
@@ -228,14 +226,3 @@ def _without_stamps(grid: bytes) -> bytes:
     cells = origin + 60
     end = cells + int.from_bytes(grid[cells - 4 : cells], "little")
     return grid[:4] + grid[12:load_time] + grid[load_time + 8 : end]
-
-
-def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the hashes of the template (its `tracks`) and the map.
-
-    Diagnostics contain them.
-    """
-    keys = {"tracks": TEMPLATE_HASH, "map": MAP_HASH}
-    return {
-        key: hash_of(topic, messages[topic]) for topic, key in keys.items() if topic in messages
-    }

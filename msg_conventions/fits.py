@@ -166,18 +166,14 @@ def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     )
 
 
-def fit_statuses(
-    fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()
-) -> tuple[Status, ...]:
+def fit_statuses(fit: Fit, node: str, routes: Sequence[Route] = ()) -> tuple[Status, ...]:
     """Return the fit for people: a status per vehicle, and one with notes and losses.
 
     Args:
         fit: the fit.
         node: full name of the planner.
-        more: values for each status.
         routes: the planned routes, whose remarks are added.
     """
-    common = dict(more or {})
     statuses = []
     notes = [str(note) for note in fit.notes]
     for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
@@ -187,11 +183,11 @@ def fit_statuses(
         is_close = largest < CLOSE_ANCHORS_M and not remarks
         level = Level.OK if is_close else Level.WARN
         text = f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {largest:.2f} m"
-        statuses.append(Status(f"{node}: fit of {vehicle.id}", level, text, common))
+        statuses.append(Status(f"{node}: fit of {vehicle.id}", level, text))
     values = {f"note.{k}": note for k, note in enumerate(notes)}
     values |= {f"lost.{k}": loss.message for k, loss in enumerate(fit.losses)}
     message = "recording fitted to the road"
     if fit.losses:
         message += f"; {len(fit.losses)} of its properties are not kept"
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.losses) else Level.OK
-    return (*statuses, Status(f"{node}: fit", level, message, values | common))
+    return (*statuses, Status(f"{node}: fit", level, message, values))

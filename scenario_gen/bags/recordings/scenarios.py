@@ -105,15 +105,20 @@ class RecordedScenarios:
         return tuple(info for _, info in self.infos if isinstance(info, RequestSummary))
 
     @cached_property
-    def missing(self) -> tuple[str, ...]:
-        """A sentence for each incomplete request."""
+    def _requests(self) -> RequestTracker:
+        """The requests with their scenarios."""
         messages = self._recorded.get(SCENARIOS, ())
         tracker = RequestTracker(max_unmatched=len(messages))
         for message in messages:
             tracker.add_scenario(digest(message.data))
         for _, info in self.infos:
             tracker.add_info(info)
-        return tuple(request.sentence() for request in tracker.incomplete(closed=False))
+        return tracker
+
+    @cached_property
+    def missing(self) -> tuple[str, ...]:
+        """A sentence for each incomplete request."""
+        return tuple(request.sentence() for request in self._requests.incomplete(closed=False))
 
     # Scenarios.
 
@@ -187,9 +192,8 @@ class RecordedScenarios:
     def scenario_set(self) -> ScenarioSet:
         """Return scenarios and counts of the last closed request.
 
-        A restarted sampler counts its requests from 1 again, so a repeated index or another seed
-        begins the request anew. Index 0 may be missing, if its candidate was rejected, and indices
-        do not always increase, since adapted candidates are counted separately.
+        Index 0 may be missing, if its candidate was rejected, and indices do not always increase,
+        since adapted candidates are counted separately.
 
         Raises:
             InputError: no request was closed, or a scenario is missing or damaged.
@@ -198,7 +202,9 @@ class RecordedScenarios:
         if not self.summaries:
             raise InputError(f"{self.path}: no request was closed on {self.where(INFO)}")
         summary = self.summaries[-1]
-        entries = self._last_entries(summary.request)
+        tracked = self._requests.open.get(summary.request)
+        hashes = tracked.entries.values() if tracked else ()
+        entries = [self._entry_by_hash[sha256] for sha256 in hashes]
         by_hash = dict(zip(self.hashes, self.data(SCENARIOS), strict=True))
         topic = self.where(SCENARIOS)
         for entry in entries:
@@ -214,19 +220,6 @@ class RecordedScenarios:
             )
         scenarios = [self._decoded(by_hash[e.sha256], e, e.index)[1] for e in entries]
         return summary.result(tuple(scenarios))
-
-    def _last_entries(self, request: str) -> list[ScenarioEntry]:
-        """Return the entries of the last request with this id."""
-        entries: dict[int, ScenarioEntry] = {}
-        seed = None
-        for entry in self.entries:
-            if entry.request != request:
-                continue
-            if entry.index in entries or entry.seed != seed:
-                entries.clear()
-            seed = entry.seed
-            entries[entry.index] = entry
-        return list(entries.values())
 
 
 def decode_with_witness(

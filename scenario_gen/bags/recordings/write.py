@@ -8,7 +8,7 @@ from pathlib import Path
 
 from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
 from msg_conventions.diagnostics import encode_diagnostics
-from msg_conventions.documents import hash_of, template_hashes
+from msg_conventions.documents import hash_of
 from msg_conventions.ego import ego_messages
 from msg_conventions.fits import fit_statuses, plan_messages
 from msg_conventions.pictures import road_markers, scenario_markers
@@ -37,7 +37,6 @@ def result_messages(
     road, fit = result.road_and_fit()
     encounter, stamp = result.encounter, result.encounter.start_ns
     template = {"tracks": encode_tracks(encounter)} | road_messages(road, stamp)
-    hashes = template_hashes(template)
     template["changepoints"] = encode_changepoints(encounter, result.segmentation)
     template |= plan_messages(
         encounter, result.segmentation, fit, result.routes, road.frame_id, template
@@ -52,7 +51,7 @@ def result_messages(
         yield topic, data, stamp
     statuses = (
         segmentation_status(result.segmentation, "/segmenter", result.encounter.duration),
-        *fit_statuses(fit, "/planner", hashes, result.routes),
+        *fit_statuses(fit, "/planner", result.routes),
     )
     yield "diagnostics", encode_diagnostics(statuses, stamp), stamp
     ego = result.generated.ego

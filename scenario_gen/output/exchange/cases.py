@@ -81,7 +81,6 @@ class Case:
         start_ns: stamp of the template [ns].
         scenarios: the requested scenarios.
         lane_map: the lanes of the road; they do not depend on the requested scenarios.
-        origin: origin of the frame, as in `LaneNetwork`.
     """
 
     number: int
@@ -90,7 +89,6 @@ class Case:
     start_ns: int
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
-    origin: tuple[float, ...] = ()
 
 
 def evenly_sampled(scenario: Scenario, step: float) -> Scenario:
@@ -248,5 +246,4 @@ def _case(
             if not indices or exported.index in indices
         ),
         lane_map=LaneMap.of(road, export.run_out),
-        origin=road.lanes.origin if road and road.lanes else (),
     )

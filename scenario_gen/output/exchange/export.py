@@ -329,7 +329,9 @@ EXPORTS = Registry[ExportFormat](
         "openscenario": ExportFormat(
             _to_openscenario, _roads, _origin_of_map, needs_lanes=True, takes_map=True
         ),
-        "autoware": ExportFormat(_to_autoware, projected_from=lambda case, _: case.origin),
+        "autoware": ExportFormat(
+            _to_autoware, projected_from=lambda case, _: case.lane_map.network.origin
+        ),
         "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files, needs_lanes=True),
         **{suffix: _to_table(suffix) for suffix in TABLES},
     },

@@ -148,7 +148,6 @@ class RoadNetwork:
         network: the lanes.
         strips: the roads.
         places: the place of each lane.
-        users: the users of each lane.
         crossings: the crossings of each road, as indices of lanes.
         obstacles: indices of the obstacles of each road.
         connecting: the lanes that are connecting roads, with their junctions.
@@ -169,7 +168,6 @@ class RoadNetwork:
             for side, lanes in strip.lanes.items()
             for m, k in enumerate(lanes)
         }
-        self.users = [lane.users for lane in network.lanes]
         crossings = {k: lane.outline for k, lane in enumerate(network.lanes) if lane.crossing}
         self.crossings = self._by_road(crossings)
         obstacles = {k: obstacle.outline for k, obstacle in enumerate(network.obstacles)}

@@ -19,8 +19,10 @@ from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.provenance import read_parameters
-from scenario_gen.method.fitting import fit_template, FittingConfig
-from scenario_gen.method.routing import plan_routes, PlanningConfig
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import FittingConfig
+from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.situation import Situation
@@ -109,12 +111,10 @@ def _replan(where: Namespace, entry: ScenarioEntry, info: BagMessage, origin: st
         segmentation, road = template.segmentation, template.road
         fitting = read_parameters(FittingConfig(), values, "fitting.", origin)
         planning = read_parameters(PlanningConfig(), values, "planning.", origin)
+        config = PipelineConfig(fitting=fitting, planning=planning, limits=limits)
         situation = Situation.of(encounter)
-        fit = fit_template(
-            situation, segmentation, road, fitting, request=requested, limits=limits
-        )
-        routes = plan_routes(road, fit, planning, entry.seed, limits)
-        template = replace(template, fit=fit, routes=routes)
+        chain = Chain(situation, segmentation, road, config, requested, seed=entry.seed)
+        template = chain.plan()
     return Replanned(template, requested, sampling, limits)
 
 

@@ -228,12 +228,10 @@ class OpenRequests:
             message = "no request is at work"
             self._node.diagnostics.status(Level.OK, message, Subject.PROGRESS, {}, log=False)
             return
-        waiting = [each for each in requests if each.started_at is None]
+        waiting = sum(each.started_at is None for each in requests)
         values = running.values()
-        values["at_work"] = str(len(requests) - len(waiting))
-        values["waiting"] = str(len(waiting))
-        for request in waiting[:MAX_NAMED_COUNT]:
-            values[f"waiting.{request.name}"] = f"{request.n_requested} scenarios"
+        values["at_work"] = str(len(requests) - waiting)
+        values["waiting"] = str(waiting)
         message = (
             f"request {running.name}: {running.accepted} of {running.n_requested} scenarios "
             f"from {running.candidates} candidates, {running.seconds():.0f} s"

@@ -21,7 +21,7 @@ from rclpy.time import Time
 
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decimal_stamp, Level
-from msg_conventions.documents import LANES, PLAN, template_hashes
+from msg_conventions.documents import LANES, PLAN
 from msg_conventions.fits import fit_statuses, plan_messages
 from msg_conventions.paths import encode_path
 from msg_conventions.poses import check_quaternions, yaw
@@ -125,9 +125,7 @@ class Planner(StageNode):
             self.outputs.send(topic, data)
         count = len(fit.anchor_index)
         self.get_logger().info(f"planned {len(routes)} routes through {count} anchors")
-        statuses = fit_statuses(
-            fit, self.get_fully_qualified_name(), template_hashes(messages), routes
-        )
+        statuses = fit_statuses(fit, self.get_fully_qualified_name(), routes)
         self.diagnostics.report(*statuses, stamp_ns=encounter.start_ns)
 
     async def _get_plan(

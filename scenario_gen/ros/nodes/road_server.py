@@ -22,7 +22,7 @@ from rclpy.serialization import deserialize_message
 
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
-from msg_conventions.documents import LANES, template_hashes
+from msg_conventions.documents import LANES
 from msg_conventions.pictures import road_markers
 from msg_conventions.roads import road_messages
 from msg_conventions.tracks import decode_tracks
@@ -122,7 +122,6 @@ class RoadServer(StageNode):
         for topic, data in messages.items():
             self.outputs.send(topic, data)
         self._grid = messages["map"]
-        template = {"map": self._grid} | ({"tracks": tracks} if tracks else {})
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, " + (
             "no lanes" if road.lanes is None else f"{len(road.entries)} entries"
@@ -135,7 +134,7 @@ class RoadServer(StageNode):
         level, message = (
             (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
         )
-        self.status(level, message, "road", stamp_ns, **template_hashes(template))
+        self.status(level, message, "road", stamp_ns)
 
     def _attempt(self, name: str, part: Encounter) -> None:
         """Build the road for a part of the encounter.
