@@ -207,6 +207,7 @@ def test_a_doubt_can_be_allowed(tmp_path):
     rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
     allowed = read_log(tmp_path / "log.csv", LogConfig(allow="doubt"))
     assert any(doubt.stops for doubt in allowed.doubts)
+    assert set(map(str, allowed.doubts)) <= set(allowed.notes)
 
 
 STOPPED = {  # what no option reads right, and what is said

@@ -54,6 +54,10 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
         "_MIN_TTC_S = (0.09000000000000001)",
     ): ("a bound of a guide of the proposal: the weights keep the share unbiased"),
     (
+        "scenario_gen/logs/geodesy.py",
+        "place @ (4096.0**2, (3686.4), 1.0), return_index=True, return_inverse=True",
+    ): "any weights that keep the cells of the earth apart",
+    (
         "scenario_gen/method/fitting/search.py",
         "first = ((self._stride // 2)) * self.road.resolution",
     ): ("the start of a search, half a cell aside: refining in steps of 1 m moves it"),
