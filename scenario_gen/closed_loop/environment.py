@@ -15,7 +15,7 @@ ego="2")`.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 from gymnasium.spaces import Box
@@ -24,16 +24,17 @@ import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.ego import Command, EgoState
+from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.lights import crosses_at_red
 from scenario_gen.closed_loop.off_road import is_off_road
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.picture import picture
-from scenario_gen.closed_loop.planners import RouteFollower
+from scenario_gen.closed_loop.planners import NEAR_STATIONS
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import trials_in
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics import ahead_and_left, angle_between, Floats, place, unit
+from scenario_gen.numerics import Bools, Floats, place
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.kernels import B1, F, F1, F2, I, kernel, OUT1
 from scenario_gen.types import GenerationResult, MAX_PLANNED_CURVATURE_PER_M
 
 MAX_OTHERS_COUNT = 8
@@ -68,14 +69,11 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
     `info["verdict"]` is the verdict.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
-
     def __init__(
         self,
         trials: GenerationResult | Sequence[Trial] | Path | str,
         config: ClosedLoopConfig = ClosedLoopConfig(),
         ego: str = "",
-        render_mode: str | None = None,
     ) -> None:
         """Prepare an environment.
 
@@ -83,17 +81,10 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
             trials: a result of `generate`, the path of a bag, or trials.
             config: the parameters.
             ego: id of the vehicle that the ego replaces, for a result or a bag.
-            render_mode: "rgb_array" or None.
 
         Raises:
-            InputError: the bag cannot be read or has no scenario, or the render mode is unknown.
+            InputError: the bag cannot be read or has no scenario.
         """
-        modes = self.metadata["render_modes"]
-        if render_mode not in (None, *modes):
-            raise InputError(
-                f"render_mode {render_mode!r} is unknown; use {', '.join(modes)} or None"
-            )
-        self.render_mode = render_mode
         if isinstance(trials, GenerationResult | Path | str):
             trials = trials_in(trials, ego)
         self.trials = list(trials)
@@ -102,7 +93,7 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
         self.config = config
         self.observation_space = observation_space()
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
-        self._loops: dict[int, ClosedLoop] = {}
+        self._loops: dict[int, tuple[ClosedLoop, Curve | None]] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -121,12 +112,12 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
             raise InputError(f"no scenario with index {index}; use an index from 0 to {last}")
         trial = self.trials[index]
         if index not in self._loops:
-            self._loops[index] = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
-        self._loop = self._loops[index]
+            loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
+            route = loop.task().route[:, :2]
+            self._loops[index] = loop, Curve.through(route) if len(route) > 2 else None
+        self._loop, self._route = self._loops[index]
         # Curvature [1/m] of the action 1.
         self.sharpest = min(self._loop.limits.sharpest, MAX_PLANNED_CURVATURE_PER_M)
-        self._follower = RouteFollower()
-        self._follower.reset(self._loop.task())
         self._states: list[State] = [self._loop.start()]
         self._station = 0.0
         return self._observed(), {"index": index, "name": trial.name}
@@ -180,60 +171,106 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
 
     def _runs_red(self) -> bool:
         """Return whether the ego crosses a stop line at red in the last step."""
+        if not self._loop.lights:
+            return False
         loop, last = self._loop, self._states[-2:]
         half = loop.scenario.vehicles[loop.ego].half[0]
         fronts = [place(state.vehicles[loop.ego], half, 0.0) for state in last]
         return crosses_at_red(loop.lights, fronts[0], fronts[1], last[1].time)
 
-    def render(self) -> npt.NDArray[np.uint8] | None:
-        """Return a top view (400, 400, 3) of 100 m x 100 m; None without a render mode."""
-        if self.render_mode is None:
-            return None
-        return picture(self._loop, self._states[-1])
-
     def _observed(self) -> Array:
-        state = self._states[-1]
-        values = np.concatenate([*self._route_values(state), self._other_values(state)])
+        loop, route = self._loop, self._route
+        state = loop.perceive(self._states[-1])
         space = self.observation_space
+        values = np.zeros(space.shape[0])
+        values[:2] = state.ego.speed, state.ego.curvature
+        if route is not None:
+            self._station = fill_route(
+                route.points, route.station, self._station, state.vehicles[loop.ego], values
+            )
+        half = loop.world.half
+        fill_others(state.vehicles, state.present, half, loop.ego, values[-7 * MAX_OTHERS_COUNT :])
         limited: Array = np.clip(values.astype(np.float32), space.low, space.high)
         return limited
 
-    def _route_values(self, state: State) -> tuple[Floats, Floats]:
-        """Return (5,) the values of the ego, and (2 R,) the points of the route."""
-        ego = state.ego
-        self._station = self._follower.locate(ego)
-        route = self._follower.route
-        if route is None:
-            values = np.array((ego.speed, ego.curvature, 0.0, 0.0, 0.0))
-            return values, np.zeros(2 * len(ROUTE_STATIONS) - 2)
-        poses = route.at(self._station + ROUTE_STATIONS)
-        x, y, yaw = poses[0].tolist()
-        _, offset = ahead_and_left(np.array(ego[:2]) - (x, y), yaw)
-        angle = angle_between(ego.yaw, yaw)
-        remaining = route.length - self._station
-        values = np.array((ego.speed, ego.curvature, offset, angle, remaining))
-        return values, _local(poses[1:, :2], ego).ravel()
 
-    def _other_values(self, state: State) -> Floats:
-        """Return (7 O,) the values of the nearest others."""
-        observation = self._loop.observe(state)
-        position = _local(observation.others[:, :2], state.ego)
-        distance = np.hypot(position[:, 0], position[:, 1])
-        order = np.argsort(distance, kind="stable")[:MAX_OTHERS_COUNT]
-        nearest = order[distance[order] <= RANGE_M]
-        padded = np.zeros((MAX_OTHERS_COUNT, 7))
-        rows, others = padded[: len(nearest)], observation.others[nearest]
-        rows[:, 0] = 1.0
-        rows[:, 1:3] = position[nearest]
-        rows[:, 3:5] = unit(others[:, 2] - state.ego.yaw)
-        rows[:, 5] = others[:, 3]
-        rows[:, 6] = observation.sizes[nearest, 0]
-        return padded.ravel()
+@kernel(inline=True)
+def _pose_on(points: Floats, stations: Floats, station: float, out: Floats) -> None:
+    """Write the pose (3,) at a station [m] of a route, as `Curve.at`."""
+    last = len(stations) - 1
+    k = min(max(int(np.searchsorted(stations, station)) - 1, 0), last - 1)
+    inside = min(max(station, stations[0]), stations[last])
+    share = (inside - stations[k]) / (stations[k + 1] - stations[k])
+    for column in range(3):
+        out[column] = points[k, column] + share * (points[k + 1, column] - points[k, column])
+    out[0] += (station - inside) * np.cos(out[2])
+    out[1] += (station - inside) * np.sin(out[2])
 
 
-def _local(positions: Floats, ego: EgoState) -> Floats:
-    """Return positions (N, 2) in the ego's frame."""
-    return np.array(ahead_and_left(positions - ego[:2], ego.yaw)).T
+@kernel(F2, F1, F, F1, OUT1)
+def fill_route(points: Floats, stations: Floats, near: float, ego: Floats, out: Floats) -> float:
+    """Write offset, angle, metres to the goal and the points of the route behind two values.
+
+    Args:
+        points: (M, 3) of the route.
+        stations: (M,) their stations [m].
+        near: station [m] of the ego in the last step.
+        ego: (4,) x, y [m], yaw [rad], speed [m/s].
+        out: (O,) as in `DriveEnv`.
+
+    Returns:
+        The station of the ego [m].
+    """
+    pose = np.empty(3)
+    station, least = near, np.inf
+    for shift in NEAR_STATIONS:
+        _pose_on(points, stations, near + shift, pose)
+        distance = np.hypot(pose[0] - ego[0], pose[1] - ego[1])
+        if distance < least:
+            station, least = near + shift, distance
+    cos, sin = np.cos(ego[2]), np.sin(ego[2])
+    for k, ahead in enumerate(ROUTE_STATIONS):
+        _pose_on(points, stations, station + ahead, pose)
+        dx, dy = pose[0] - ego[0], pose[1] - ego[1]
+        if k == 0:
+            out[2] = dx * np.sin(pose[2]) - dy * np.cos(pose[2])
+            out[3] = (ego[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
+            out[4] = stations[len(stations) - 1] - station
+        else:
+            out[3 + 2 * k] = dx * cos + dy * sin
+            out[4 + 2 * k] = dy * cos - dx * sin
+    return float(station)
+
+
+@kernel(F2, B1, F2, I, OUT1)
+def fill_others(vehicles: Floats, present: Bools, half: Floats, ego: int, out: Floats) -> None:
+    """Write the nearest others, 7 values each, as in `DriveEnv`.
+
+    Args:
+        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s].
+        present: (N,) whether each is observed.
+        half: (N, 2) half lengths and widths [m].
+        ego: index of the ego.
+        out: (O,) filled with zeros.
+    """
+    dx = vehicles[:, 0] - vehicles[ego, 0]
+    dy = vehicles[:, 1] - vehicles[ego, 1]
+    distance = np.where(present, np.hypot(dx, dy), np.inf)
+    distance[ego] = np.inf
+    cos, sin = np.cos(vehicles[ego, 2]), np.sin(vehicles[ego, 2])
+    for k in range(min(len(vehicles), len(out) // 7)):
+        i = np.argmin(distance)
+        if distance[i] > RANGE_M:
+            return
+        distance[i] = np.inf
+        row = out[7 * k : 7 * k + 7]
+        row[0] = 1.0
+        row[1] = dx[i] * cos + dy[i] * sin
+        row[2] = dy[i] * cos - dx[i] * sin
+        row[3] = np.cos(vehicles[i, 2] - vehicles[ego, 2])
+        row[4] = np.sin(vehicles[i, 2] - vehicles[ego, 2])
+        row[5] = vehicles[i, 3]
+        row[6] = 2.0 * half[i, 0]
 
 
 def observation_space() -> Box:

@@ -3,43 +3,24 @@
 
 """An occupancy grid around the ego, with the road and the other vehicles."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.numerics import ahead_and_left, Bools, Floats
+from scenario_gen.types import Road
 
 HALF_SIZE_M = 30.0
 
 
-@dataclass(frozen=True, eq=False)
-class LocalMap:
-    """An occupancy grid.
-
-    Attributes:
-        blocked: (H, W) whether a cell is occupied; row 0 has the lowest y.
-        resolution: size of a cell [m].
-        origin: (2,) x, y [m] of the lower-left corner.
-    """
-
-    blocked: Bools
-    resolution: float
-    origin: Floats
-
-
-def local_map(loop: ClosedLoop, state: State) -> LocalMap:
+def local_map(loop: ClosedLoop, road: Road, state: State) -> tuple[Bools, Floats]:
     """Return the cells of the road's grid within HALF_SIZE_M of the ego, in x and in y.
 
     A cell with its centre in another vehicle is occupied.
 
-    Raises:
-        InputError: no road is known.
+    Returns:
+        (H, W) whether each cell is occupied, where row 0 has the lowest y, and the lower-left
+        corner (2,) [m].
     """
-    road = loop.road
-    if road is None:
-        raise InputError(f"scenario {loop.scenario.index}: no road is known")
     size = road.resolution
     cells = round(2.0 * HALF_SIZE_M / size)
     origin = (
@@ -53,4 +34,4 @@ def local_map(loop: ClosedLoop, state: State) -> LocalMap:
             ahead, left = ahead_and_left(centres - state.vehicles[i, :2], state.vehicles[i, 2])
             half_length, half_width = loop.world.half[i]
             blocked |= (np.abs(ahead) <= half_length) & (np.abs(left) <= half_width)
-    return LocalMap(blocked, size, origin)
+    return blocked, origin

@@ -104,7 +104,13 @@ def _touches(road: Road, poses: Floats, half: tuple[float, float]) -> Bools:
 
 def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: float) -> bool:
     """Whether a footprint at a pose (3,) is off the road, as in `road_use`, or in an obstacle."""
-    if _is_out(road, pose[None], half, limit)[0]:
+    column, row = to_cells(road, pose[:2]).astype(np.int64).tolist()
+    height, width = road.drivable.shape
+    has_room = False
+    if 0 <= column < width and 0 <= row < height:
+        room = road.clearance_cells[row, column] - _HALF_DIAGONAL_CELLS
+        has_room = bool(room * road.resolution > math.hypot(*half))
+    if not has_room and _is_out(road, pose[None], half, limit)[0]:
         return True
     return bool(road.obstacles) and bool(_touches(road, pose[None], half).any())
 

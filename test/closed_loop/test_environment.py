@@ -3,8 +3,6 @@
 
 """The Gymnasium environment keeps Gymnasium's promises, is deterministic, and runs many at once."""
 
-from dataclasses import replace
-
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 import numpy as np
@@ -16,7 +14,6 @@ from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.environment import DriveEnv, ID
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.picture import COLOURS, SIZE_PX
 from scenario_gen.types import Road
 
 TRIALS = [Trial(str(seed), draw_scenario(seed), 0, None) for seed in (1, 2, 5)]
@@ -37,7 +34,7 @@ def drive(env, seed):
 
 @pytest.mark.filterwarnings("error::UserWarning")
 def test_gymnasium_finds_nothing_wrong():
-    env = gymnasium.make(ID, trials=TRIALS, render_mode="rgb_array")
+    env = gymnasium.make(ID, trials=TRIALS)
     assert (
         env.spec.id == ID
         and np.isfinite(env.observation_space.low).all()
@@ -52,25 +49,6 @@ def test_infinite_actions_are_refused(bad):
     env.reset(seed=1)
     with pytest.raises(InputError, match="must be finite"):
         env.step(np.array((bad, 0.0), dtype=np.float32))
-
-
-def test_picture_shows_road_route_and_vehicles():
-    road = Road(
-        "r",
-        np.ones((40, 40), dtype=bool),
-        1.0,
-        np.array((-20.0, -20.0)),
-        np.zeros((0, 3)),
-        np.zeros((0, 3)),
-    )
-    env = DriveEnv([replace(TRIALS[0], road=road)], render_mode="rgb_array")
-    env.reset(seed=1)
-    image = env.render()
-    assert image.shape == (SIZE_PX, SIZE_PX, 3)
-    assert tuple(image[SIZE_PX // 2, SIZE_PX // 2]) == COLOURS.ego
-    assert DriveEnv(TRIALS).render() is None
-    with pytest.raises(InputError, match="render_mode 'human'"):
-        DriveEnv(TRIALS, render_mode="human")
 
 
 def test_gymnasium_makes_vectors_of_it():

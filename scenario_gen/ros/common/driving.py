@@ -389,10 +389,10 @@ def surroundings(
         yield "traffic/markers", markers
 
     map_steps = max(round(MAP_PERIOD_S / loop.config.step), 1)
-    is_due = state.step % map_steps == 0 and loop.road is not None
-    if is_due and has_subscribers("traffic/local_map"):
-        grid = local_map(loop, state)
-        data = driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp)
+    road = loop.road if state.step % map_steps == 0 else None
+    if road is not None and has_subscribers("traffic/local_map"):
+        blocked, origin = local_map(loop, road, state)
+        data = driving.encode_local_map(blocked, road.resolution, origin, frame, stamp)
         yield "traffic/local_map", data
 
     for topic in autoware:
