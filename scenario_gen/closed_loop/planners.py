@@ -36,20 +36,13 @@ class RouteFollower:
         self.route = Curve.through(task.route[:, :2]) if len(task.route) > 2 else None
         self._near = 0.0
 
-    def locate(self, ego: EgoState) -> float:
-        """Return the ego's station on the route [m]."""
+    def steer(self, ego: EgoState) -> tuple[float, float]:
+        """Return the curvature to drive [1/m], and the ego's station on the route [m]."""
         if self.route is None:
-            return 0.0
+            return 0.0, 0.0
         around = self._near + NEAR_STATIONS
         offset = self.route.at(around)[:, :2] - ego[:2]
         self._near = float(around[np.argmin(np.hypot(offset[:, 0], offset[:, 1]))])
-        return self._near
-
-    def steer(self, ego: EgoState) -> tuple[float, float]:
-        """Return the curvature to drive [1/m], and the ego's station on the route [m]."""
-        self.locate(ego)
-        if self.route is None:
-            return 0.0, 0.0
         ahead = min(max(0.8 * ego.speed, 3.0), 15.0)
         along, left = ahead_and_left(self.route.at(self._near + ahead)[:2] - ego[:2], ego.yaw)
         return float(2.0 * left / np.maximum(along * along + left * left, 1e-6)), self._near
@@ -76,9 +69,9 @@ class ConstantSpeed(RouteFollower):
 class IdmFollower(RouteFollower):
     """Follows its route at a safe distance from the vehicles on it (IDM), and stops at red.
 
-    It also lets vehicles pass that will be on the route if they drive straight on, unless it
-    clears their way `margin` [s] before them. `speed` [m/s] is its speed on a free and straight
-    road.
+    It also lets vehicles pass, and merge, that will be on the route if they drive straight on,
+    unless it clears their way `margin` [s] before them. `speed` [m/s] is its speed on a free and
+    straight road.
 
     Source: intelligent driver model, Treiber, Hennecke & Helbing 2000.
     """
@@ -89,6 +82,7 @@ class IdmFollower(RouteFollower):
     acceleration: float = 2.0  # m/s²
     foresight: float = 6.0  # s, horizon of the prediction that others drive straight on
     margin: float = 1.5  # s
+    merge_margin: float = 0.7  # s, ahead of a vehicle that follows then
     room: float = 0.5  # m, lateral clearance
 
     def act(self, observation: Observation) -> Command:
@@ -142,9 +136,10 @@ class IdmFollower(RouteFollower):
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
         """Return the gap [m] to the next vehicle on the route, and its speed along it [m/s].
 
-        A vehicle that enters the route from the side counts at the place of its entry, unless the
-        ego clears it before. Where the ego can no longer stop, it need not be so early. Infinity
-        and 0 if the route is free.
+        A vehicle that enters the route later counts, unless the ego clears it before. Where the
+        ego can no longer stop, it need not be so early. One that merges ahead of the ego counts as
+        if it were on the route already, all others at the place of their entry, as if they stood.
+        Infinity and 0 if the route is free.
         """
         if self.route is None or not seen.ids:
             return math.inf, 0.0
@@ -159,21 +154,28 @@ class IdmFollower(RouteFollower):
         extent = half_length + length * along + width * across
         gap = stations.reshape(shape) - station - extent
         lateral_reach = half_width + length * across + width * along
-        lateral_gap = np.abs(offset.reshape(shape)) - lateral_reach
-        direction = np.cos(turn[:, 0])
-        crosses = direction[:, None] < 0.7
+        is_near = np.abs(offset.reshape(shape)) - lateral_reach < self.room
         clear = gap + 2.0 * extent
         can_stop = gap > seen.ego.speed**2 / (2.0 * MAX_BRAKING_MPS2)
-        is_close = self._driven(seen.ego.speed, times - self.margin) < clear
+        merges = np.cos(turn) >= 0.7
+        margin = np.where(merges, self.merge_margin, self.margin)
+        is_close = self._driven(seen.ego.speed, times - margin) < clear
         is_first = self._driven(seen.ego.speed, times) < clear
         before_ego = is_first | (is_close & can_stop)
-        on_route = (lateral_gap < self.room) & (gap > -half_length)
-        counts = on_route & ((times == 0.0) | (crosses & before_ego))
-        entry_gap = gap[np.arange(len(gap)), counts.argmax(axis=1)]
-        first_gap = np.where(counts.any(axis=1), entry_gap, math.inf)
+        follows = is_near[:, :1] & (gap[:, :1] <= -half_length) & merges[:, :1]
+        on_route = is_near & (gap > -half_length)
+        counts = on_route & ((times == 0.0) | (before_ego & ~follows))
+        rows, entry = np.arange(len(gap)), counts.argmax(axis=1)
+        direction = np.cos(turn[rows, entry])
+        speeds = seen.others[:, 3] * np.maximum(direction, 0.0)
+        entry_gap = gap[rows, entry]
+        now = entry_gap - speeds * times[entry]
+        enters_ahead = self._driven(seen.ego.speed, times[entry] + 0.5) < entry_gap
+        leads = (entry == 0) | (merges[rows, entry] & (enters_ahead | (now > 0.0)))
+        first_gap = np.where(leads & ~enters_ahead, now, entry_gap)
+        first_gap = np.where(counts.any(axis=1), first_gap, math.inf)
         k = int(first_gap.argmin())
-        speed = float(seen.others[k, 3]) * max(float(direction[k]), 0.0)
-        return max(float(first_gap[k]), 0.0), speed
+        return max(float(first_gap[k]), 0.0), float(speeds[k] * leads[k])
 
     def _driven(self, speed: float, times: Floats) -> Floats:
         """Return the ways (T,) [m] after times (T,) [s] of an ego that accelerates freely."""

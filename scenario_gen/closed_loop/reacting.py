@@ -47,7 +47,7 @@ from scenario_gen.types import (
 
 OPEN_S = (3.0, 4.5, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 16.5)
 """Times at which the reference drive enters the gap of a stream that it crosses."""
-MERGE_S = (3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 24.0, 27.0, 30.0)
+MERGE_S = (3.0, 6.5, 10.0, 13.5, 17.0, 20.5, 24.0, 27.5, 31.0, 34.5)
 """Those of a stream that it joins: no queue follows, so speed laws pass for longer."""
 QUEUE_S = (1.5, 5.5)  # of the ego behind the conflict area, alternately
 TRIED_PER_KEPT_COUNT = 5  # valid scenarios of a template, before it is given up
@@ -87,6 +87,12 @@ class Selection:
     kept: int = 0
     unfit: Counter[str] = field(default_factory=Counter)
     tries: int = 0
+
+    @property
+    def reason(self) -> str:
+        """Why most other candidates are refused, as the end of a sentence; "" without any."""
+        (cause, number), *_ = self.unfit.most_common(1) or [("", 0)]
+        return f"; most others, {number} of {self.unfit.total()}: {cause}" if number else ""
 
     def keeps(self, loop: ClosedLoop) -> bool:
         """Keep a scenario if the set tests with it; return whether it is kept."""
@@ -148,7 +154,6 @@ class Testing:
                 wanted = -(-(count - selection.kept) // (len(plans) - k))
                 if wanted and process_time() < end:
                     results += self._drawn(plan, wanted, turn, selection, end, progress)
-        causes = ", ".join(f"{number} {cause}" for cause, number in selection.unfit.most_common())
         shortage = ""
         if selection.kept < count:
             is_over = process_time() > end
@@ -157,13 +162,13 @@ class Testing:
                 ego=self.request.ego,
                 kept=selection.kept,
                 requested=count,
-                causes=causes,
-                advice=f"search for more than {self.budget:g} s: --budget" if is_over else "",
+                reason=selection.reason,
+                advice=f"; search for more than {self.budget:g} s: --budget" if is_over else "",
             )
             shortage = str(note)
         if not results:
             raise TargetError(shortage)
-        self.notify(f"{selection.kept} of {count} scenarios for testing ({causes})")
+        self.notify(f"{selection.kept} of {count} scenarios for testing{selection.reason}")
         return TestSets(results, shortage)
 
     def _plans(self, selection: Selection) -> list[tuple[Chain, Planned]]:

@@ -28,11 +28,12 @@ from scenario_gen.types import Decided, Decision, Encounter, Motion, Outcome, to
 ACCELERATION_MPS2 = 1.5  # of the ego that departs
 BRAKING_MPS2 = 2.0  # of the ego that stops in a queue
 STOPPING_MARGIN_M = 2.5  # from the ego that waits to the conflict area
+MERGE_MARGIN_M = 7.0  # from an ego that merges: nearer ones stand beside the stream
 MIN_STREAM_MPS = 4.0  # speed of the stream
 TOP_SPEED_MPS = 14.0  # of the ego
 CLOSED_S = 1.3  # between two vehicles of the stream, in the conflict area
 SPARE_S = (1.9, 1.7)  # from the stream to the ego that crosses, and from the ego to the stream
-MERGE_SPARE_S = (0.9, 1.7)  # of an ego that merges; no queue stops it
+MERGE_SPARE_S = (0.9, 2.2)  # of an ego that merges; no queue stops it
 APPEARS_M = 55.0  # before the conflict area
 EXIT_M = 30.0  # from the conflict area to the goal of the ego
 EXTENSION_M = 60.0  # of both paths, straight
@@ -167,8 +168,9 @@ class Stream:
         """
         dt = self.encounter.dt
         ego, other = self.ego, self.other
-        stop = ego.entry - STOPPING_MARGIN_M
-        departs = time - np.sqrt(2.0 * STOPPING_MARGIN_M / ACCELERATION_MPS2)
+        margin = MERGE_MARGIN_M if self.joins else STOPPING_MARGIN_M
+        stop = ego.entry - margin
+        departs = time - np.sqrt(2.0 * margin / ACCELERATION_MPS2)
         way = ego.exit + QUEUE_M - stop if queue else np.inf
         peak = min(ego.speed, np.sqrt(way / (0.5 / ACCELERATION_MPS2 + 0.5 / BRAKING_MPS2)))
         leaves = queue and departs + 0.5 * peak / ACCELERATION_MPS2 + 0.5 * peak / BRAKING_MPS2

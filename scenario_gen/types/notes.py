@@ -111,8 +111,8 @@ class NoteKind(Enum):
     CANCELLED = "cancelled"
     FILTERED = "filtered by {condition!r}: {kept} of {total} scenarios"
     EGO_TESTS = (
-        "for testing ego {ego}: {kept} of {requested} scenarios found in which it has to react "
-        "({causes}); {advice}"
+        "for testing ego {ego}: {kept} of {requested} scenarios found in which it has to react"
+        "{reason}{advice}"
     )
     SEARCHED = "failures of {planner}, found by a search: not a random sample of natural scenarios"
 
