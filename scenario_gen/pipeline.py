@@ -19,12 +19,11 @@ from scenario_gen.method.arguments import (
     Templates,
     whole_number,
 )
-from scenario_gen.method.chain import Generation
+from scenario_gen.method.chain import AUTO, Generation
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, EvaluationConfig, replay
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
 from scenario_gen.method.sampling import Callbacks, Progress
-from scenario_gen.method.suitable_roads import AUTO
 from scenario_gen.numerics.blas import one_blas_thread
 from scenario_gen.types import (
     Coverage,

@@ -48,7 +48,6 @@ STAGES = (
     "config",
     "arguments",
     "shortening",
-    "suitable_roads",
     "chain",
 )
 # Each concept, its one home, and what would show a second one: a regular expression, searched in the whole text of a file.

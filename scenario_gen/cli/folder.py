@@ -15,8 +15,8 @@ from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
+from scenario_gen.method.chain import AUTO, with_suitable_roads
 from scenario_gen.method.sampling import TargetError
-from scenario_gen.method.suitable_roads import AUTO, with_suitable_roads
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate_outcomes, PipelineConfig
 from scenario_gen.types import (

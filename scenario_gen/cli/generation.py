@@ -175,7 +175,7 @@ def _request(options: Generate) -> "Request":
 def generate(options: Generate) -> None:
     """Generate scenarios from a log; write a bag, a report and figures to one folder."""
     from scenario_gen.cli.folder import FolderRequest, generate_folder
-    from scenario_gen.method.suitable_roads import AUTO
+    from scenario_gen.method.chain import AUTO
 
     logs = [options.log, *([path] for path in options.recording or [])]
     request = FolderRequest(
@@ -216,8 +216,8 @@ def roads(
     from scenario_gen.base.errors import InputError
     from scenario_gen.cli.folder import chosen
     from scenario_gen.logs import read_log
+    from scenario_gen.method.chain import fits_road, suitable_roads
     from scenario_gen.method.segmentation import segment
-    from scenario_gen.method.suitable_roads import fits_road, suitable_roads
     from scenario_gen.output.plot import draw_map
     from scenario_gen.roads import BUILT_IN, CORRIDOR
     from scenario_gen.situation import Situation

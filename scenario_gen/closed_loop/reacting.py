@@ -24,10 +24,9 @@ from scenario_gen.closed_loop.planners import IdmFollower, ReferenceFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, Planner
 from scenario_gen.closed_loop.streams import Stream
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.method.chain import Chain, Generation
+from scenario_gen.method.chain import AUTO, Chain, Generation, suitable_roads
 from scenario_gen.method.sampling import Callbacks, Progress, TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.method.suitable_roads import AUTO, suitable_roads
 from scenario_gen.numerics import Ints
 from scenario_gen.pipeline import completed, PipelineConfig
 from scenario_gen.situation import Situation

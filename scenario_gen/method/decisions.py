@@ -46,7 +46,7 @@ from scenario_gen.method.drives import (
 from scenario_gen.method.evaluation.law import DISTANCE
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.situation import conflict_of, passing, Situation, Track
-from scenario_gen.situation.evidence import heading_difference, LIMITS
+from scenario_gen.situation.yielding import heading_difference, LIMITS
 from scenario_gen.types import (
     Decided,
     Decision,

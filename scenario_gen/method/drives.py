@@ -19,8 +19,8 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, polyline_of, running_sum, runs
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.situation import Track
-from scenario_gen.situation.evidence import smoothed_speed
 from scenario_gen.situation.tracks import MIN_WAIT_S
+from scenario_gen.situation.yielding import smoothed_speed
 
 STATION_STEP_M = 0.25
 RIGHT_ANGLE_RAD = 0.5 * math.pi

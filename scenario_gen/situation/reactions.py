@@ -12,20 +12,22 @@ import numpy as np
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation.conflicts import Conflict
-from scenario_gen.situation.evidence import (
+from scenario_gen.situation.gaps import bumper_gaps, is_behind, MIN_HEADWAY_SPEED_MPS
+from scenario_gen.situation.signal_stops import find_signal_stops, SignalExplanations
+from scenario_gen.situation.tracks import Track, Wait
+from scenario_gen.situation.yielding import (
     closeness_confidence,
     combined_confidence,
     Evidence,
+    giving_way,
     heading_difference,
     LIMITS,
     need_confidence,
     Recording,
     smoothed_speed,
+    waits_for_leader,
+    yielding_evidence,
 )
-from scenario_gen.situation.gaps import bumper_gaps, is_behind, MIN_HEADWAY_SPEED_MPS
-from scenario_gen.situation.signal_stops import find_signal_stops, SignalExplanations
-from scenario_gen.situation.tracks import Track, Wait
-from scenario_gen.situation.yielding import giving_way, waits_for_leader, yielding_evidence
 from scenario_gen.types import Encounter, FOLLOW, Reaction, ReactionGraph
 
 

@@ -102,7 +102,6 @@ from scenario_gen.types.scenario import (
     with_witness,
 )
 from scenario_gen.types.segments import describe_segments
-from scenario_gen.types.signal_schedule import SignalSchedule, SignalState
 from scenario_gen.types.target import (
     join_pieces,
     Pair,
@@ -115,6 +114,8 @@ from scenario_gen.types.target import (
 from scenario_gen.types.traffic_light import (
     fronts,
     rightwards,
+    SignalSchedule,
+    SignalState,
     SignalStop,
     TrafficLight,
     TURNS,

@@ -16,7 +16,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import CAR, LANE_USERS
 from scenario_gen.numerics import edge_yaws, Floats, freeze, frozen, place
 from scenario_gen.types.notes import Note
-from scenario_gen.types.signal_schedule import SignalSchedule
+from scenario_gen.types.traffic_light import SignalSchedule
 
 LEVEL_SPACING_M = 2.5  # height difference of two lanes of which one crosses above the other
 OBSTACLE_HEIGHT_M = 1.5

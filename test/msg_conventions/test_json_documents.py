@@ -18,7 +18,7 @@ from scenario_gen.types import (
     TrafficLight,
     YIELD,
 )
-from scenario_gen.types.signal_schedule import SignalSchedule, SignalState
+from scenario_gen.types.traffic_light import SignalSchedule, SignalState
 
 FACTS = Facts(
     closest_approach_m=0.1 + 0.2,

@@ -14,7 +14,7 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation.measures import figures_of, measure, most_critical
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.importance_sampling import TargetError
+from scenario_gen.method.sampling.sampler import TargetError
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.pipeline import generate

@@ -13,10 +13,9 @@ from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
 from scenario_gen.situation import Conflict, interaction_windows, kind_of, Situation
-from scenario_gen.situation.evidence import Recording
 from scenario_gen.situation.reactions import without_circles
 from scenario_gen.situation.separation import least_gaps
-from scenario_gen.situation.yielding import _enters_from_beside
+from scenario_gen.situation.yielding import _enters_from_beside, Recording
 from scenario_gen.types import Encounter, FOLLOW, Reaction, Vehicle, YIELD
 
 TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))

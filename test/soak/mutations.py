@@ -50,7 +50,7 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
         "a step of a grid: another one takes its place, within the same deviation"
     ),
     (
-        "scenario_gen/method/sampling/importance_sampling.py",
+        "scenario_gen/method/sampling/sampler.py",
         "_MIN_TTC_S = (0.09000000000000001)",
     ): ("a bound of a guide of the proposal: the weights keep the share unbiased"),
     (

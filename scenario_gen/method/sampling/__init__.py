@@ -6,9 +6,9 @@
 from scenario_gen.method.sampling.build_model import kept_reactions
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
-from scenario_gen.method.sampling.importance_sampling import directions, TargetError
 from scenario_gen.method.sampling.natural import NaturalScenarios
 from scenario_gen.method.sampling.plan import Callbacks, Cancelled, OnValid, Plan, Progress
+from scenario_gen.method.sampling.sampler import directions, TargetError
 from scenario_gen.method.sampling.stage import checker_of, draw_scenarios, sample_scenarios
 from scenario_gen.method.sampling.variation import relaxed_states
 

@@ -14,9 +14,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenario_gen.method.sampling.filters import Candidate, ValidityFilter
-from scenario_gen.method.sampling.importance_sampling import directions, Proposal, TargetSet
 from scenario_gen.method.sampling.plan import Cancelled
-from scenario_gen.method.sampling.sampler import BLOCK_CANDIDATES, LEVELS, Sampler, STAGE_SLOT
+from scenario_gen.method.sampling.sampler import (
+    BLOCK_CANDIDATES,
+    directions,
+    LEVELS,
+    Proposal,
+    Sampler,
+    STAGE_SLOT,
+    TargetSet,
+)
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Cause, Scenario, UNITS
 

@@ -11,8 +11,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from scenario_gen.method.sampling.candidates import CandidateModel
-from scenario_gen.method.sampling.importance_sampling import TargetSet
-from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS, Sampler
+from scenario_gen.method.sampling.sampler import (
+    Block,
+    BLOCK_CANDIDATES,
+    LEVELS,
+    Sampler,
+    TargetSet,
+)
 from scenario_gen.method.sampling.time_warp import MIN_RATE_RATIO, SAMPLE_PERIOD_S
 from scenario_gen.method.sampling.trimming import MIN_DURATION_S
 from scenario_gen.numerics import Floats

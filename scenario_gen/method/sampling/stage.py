@@ -27,18 +27,16 @@ from scenario_gen.method.sampling.filters import (
     RarityFilter,
     ValidityFilter,
 )
-from scenario_gen.method.sampling.importance_sampling import (
-    estimated_share,
-    TargetError,
-    TargetSet,
-)
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.sampler import (
     BLOCK_CANDIDATES,
     DIRECTED_SLOT,
+    estimated_share,
     Label,
     LEVELS,
     Sampler,
+    TargetError,
+    TargetSet,
 )
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.situation import Conflict, conflict_of, Situation

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, kstest, multivariate_normal, norm, ortho_group
 
-from scenario_gen.method.sampling.importance_sampling import (
+from scenario_gen.method.sampling.sampler import (
     directions,
     estimated_share,
     Proposal,
