@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 import heapq
 from typing import Generic, TypeVar
 
-from msg_conventions.scenario_info import Info, RequestSummary, ScenarioEntry
+from msg_conventions.scenario_info import decode_info, Info, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import digest
+from scenario_gen.base.errors import InputError
 
 _MAX_ENTRY_COUNT = 300_000  # of open requests; the oldest requests are dropped
 _MAX_COMPLETE_COUNT = 1000  # remembered complete requests
@@ -150,6 +151,13 @@ class RequestTracker:
         """Return the hashes of an entry's messages."""
         has_witness = self._with_witness and entry.witness
         return (*entry.hashes, entry.witness) if has_witness else entry.hashes
+
+    def add_message(self, data: bytes) -> None:
+        """Add a message of `scenarios/info`; a damaged one is ignored."""
+        try:
+            self.add_info(decode_info(data))
+        except InputError:
+            return
 
     def add_info(self, info: Info) -> Match | None:
         """Add an entry or a summary; return an entry with its scenario, if that has arrived."""

@@ -134,7 +134,7 @@ class Recorder(Node):  # type: ignore[misc]
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
-        lost = self._losses.summary()
+        lost = self._losses.summary(ended=True)
         bag.not_recorded = {topic: str(loss) for topic, loss in lost.items()}
         self._warn(lost)
         with _disk_errors():
@@ -266,7 +266,7 @@ class Recorder(Node):  # type: ignore[misc]
             now: Time = self.get_clock().now()
             with self._guarded():
                 self._bag.write(topic, data, now.nanoseconds)
-            self._losses.add(topic, number)
+            self._losses.add(topic, data, number)
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:

@@ -17,7 +17,7 @@ def test_earlier_messages_are_no_loss(topic):
     losses, quality = MessageLoss(lambda _: 1), topic_entry(topic)[1]
     losses.begin(topic, quality)
     for number in (5358, 5359, 5362):
-        losses.add(topic, number)
+        losses.add(topic, b"", number)
     said = str(losses.summary().get(topic, ""))
     assert (BEGAN_LATE in said) == (topic in ("/verdicts", "/ego/witness"))
     assert said.startswith("2 lost") == (topic != "/map"), (
