@@ -197,7 +197,7 @@ class Curve:
 
         It may reach into the extensions.
         """
-        count = max(int(np.ceil((end - start) / step)), 1)
+        count = max(int(np.ceil((end - start) / step - 1e-6)), 1)
         return Curve(self.at(np.linspace(start, end, count + 1)))
 
 

@@ -185,7 +185,7 @@ def lateral_covariance_root(
     corrections = config.steering * steering.root(path.arc)
     factor = np.hstack([regression.predict(path.arc).factor, corrections])
     scale = np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)
-    return scale[:, None] * principal(factor, 1e-6 * sigma)
+    return scale[:, None] * principal(factor)
 
 
 def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> Floats:

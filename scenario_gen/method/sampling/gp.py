@@ -25,6 +25,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 
 _RANK_RATIO = 1e-15  # of the largest variance: smaller ones are rounding
+_CARRIES_RATIO = 1e-4  # of the largest standard deviation: a direction that changes a draw
 _MIN_PIVOT_RATIO = 1e-12  # of a unit row: a smaller one repeats the others
 _MIN_DIAGONAL_RATIO = 1e-13  # of the largest entry: a smaller one leaves the mean undetermined
 
@@ -43,21 +44,22 @@ def covariance_root(covariance: Floats) -> Floats:
     return np.asarray(direction[:, carries] * np.sqrt(variance[carries]))
 
 
-def principal(factor: Floats, tolerance: float) -> Floats:
+def principal(factor: Floats) -> Floats:
     """Return the principal directions (n, c) of a Gaussian, the largest first.
 
     They depend on its covariance alone, not on the basis of the factor: the same standard normal
-    numbers give the same draw on any CPU. The sign of each is fixed.
+    numbers give the same draw on any CPU. So directions whose number would depend on rounding are
+    left out, and the sign of each is fixed.
 
     Args:
         factor: (n, r) with the covariance factor factorᵀ.
-        tolerance: standard deviation up to which directions are left out.
     """
     direction, deviation, _ = np.linalg.svd(factor, full_matrices=False)
-    direction = direction[:, deviation > tolerance]
+    carries = deviation > _CARRIES_RATIO * deviation.max(initial=0.0)
+    direction, deviation = direction[:, carries], deviation[carries]
     rank = np.arange(1.0, len(direction) + 1.0)[:, None]
     sign = np.where((direction / rank).sum(axis=0) < 0.0, -1.0, 1.0)
-    return np.asarray(direction * sign * deviation[deviation > tolerance])
+    return np.asarray(direction * sign * deviation)
 
 
 class Features:

@@ -125,7 +125,7 @@ class TimeWarp:
             free = Observations(x[:3], none[:3], none[:3], (0, 1, 1))
             at_end = Regression(features, free).predict(grid[-1:])
             self._end_sigma = float(np.sqrt(np.square(at_end.factor).sum()))
-            both = principal(np.vstack([value.factor, slope.factor]), 1e-9)
+            both = principal(np.vstack([value.factor, slope.factor]))
             self._factor, self._rates = both[: len(grid)], both[len(grid) :]
 
     @property

@@ -27,6 +27,7 @@ from scenario_gen.roads.vector.signs import rules_of_pieces, with_rules
 from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork, LEVEL_SPACING_M, Note, NoteKind
 
 _MIN_BORDER_M = 0.05
+_SAME_SHARE_RATIO = 1e-6  # of the length of a border: nearer vertices are one
 _CHUNK_ROWS = 64  # lanes whose neighbours are looked up at once
 _MAX_COMPARED_COUNT = 400_000  # pairs of lanes with overlapping bounding boxes
 
@@ -136,9 +137,9 @@ def cross_sections(left: Floats, right: Floats, place: str) -> tuple[Floats, Flo
         borders.append(points)
         shares.append(length / length[-1])
         longest = max(longest, float(length[-1]))
-    even = np.linspace(0.0, 1.0, math.ceil(longest / SECTION_LENGTH_M) + 1)
+    even = np.linspace(0.0, 1.0, math.ceil(longest / SECTION_LENGTH_M - 1e-6) + 1)
     share = np.unique(np.concatenate((*shares, even)))
-    share = share[np.concatenate(([True], np.diff(share) > 1e-9))]
+    share = share[np.concatenate(([True], np.diff(share) > _SAME_SHARE_RATIO))]
     share[-1] = 1.0
     first, second = (
         np.column_stack([np.interp(share, at, column) for column in points.T])

@@ -11,7 +11,13 @@ import scipy.linalg
 
 from benchmarks._paper_chain import ordinate_posterior, ordinate_samples
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.gp import Features, Observations, Regression, squared_exponential
+from scenario_gen.method.sampling.gp import (
+    Features,
+    Observations,
+    principal,
+    Regression,
+    squared_exponential,
+)
 
 
 def dense(x, y, noise, at, sigma, length, degree):
@@ -126,3 +132,16 @@ def test_contradicting_exact_observations():
             Features(0.0, 10.0, 1.0, 3.0),
             Observations(np.array([1.0, 1.0]), np.array([0.0, 1.0]), np.zeros(2)),
         )
+
+
+@pytest.mark.parametrize("last", [0.977e-6, 1.002e-6, 1e-9])
+def test_directions_do_not_depend_on_rounding(last):
+    """A direction of a millionth is noise of the factorisation; it may not number the others."""
+    rng = np.random.default_rng(2)
+    directions, _ = np.linalg.qr(rng.normal(size=(40, 4)))
+    basis, _ = np.linalg.qr(rng.normal(size=(4, 4)))
+    factor = directions * np.array([2.0, 0.5, 0.01, last])
+    root = principal(factor)
+    assert root.shape == (40, 3)
+    np.testing.assert_allclose(principal(factor @ basis), root, atol=1e-12)
+    np.testing.assert_allclose(root @ root.T, factor @ factor.T, atol=1e-11)

@@ -391,7 +391,7 @@ def _conditioned(spline: SpeedSpline, factor: Floats) -> Floats:
         parts.append(part)
     whole = np.hstack(parts)
     length = (spline.length @ whole)[None] / float(spline.length.sum())
-    root = principal(_tied(whole, length), 1e-4)
+    root = principal(_tied(whole, length))
     root[given] = 0.0  # exactly: a stand stands
     return root
 
