@@ -77,7 +77,7 @@ def test_yielder_waits_for_a_delayed_vehicle(led, share, slot):
             assert conflict.second == 1
             lag = lag_behind(motion, conflict)
             if kept:
-                assert conflict.exit_first > conflict_of(driven, 1, 0).exit_first + 0.5, (
+                assert conflict.exit_first > conflict_of(driven, 1, 0).exit_first + 0.25, (
                     "the ego did hold it up"
                 )
                 assert own - 0.2 <= lag <= own + 0.5

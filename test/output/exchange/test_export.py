@@ -64,7 +64,7 @@ def test_chosen_scenario_with_ego_is_exported(small_bag, tmp_path):
         "--out",
         str(out),
         "--index",
-        "1",
+        "8",
         "--namespace",
         "t",
     ]
@@ -81,7 +81,7 @@ def test_chosen_scenario_with_ego_is_exported(small_bag, tmp_path):
         "/perception/object_recognition/tracking/objects",
     }
     (entry,) = json.loads((out / MANIFEST).read_text())["scenarios"]
-    assert (entry["index"], entry["ego"], entry["vehicles"]) == (1, "2", ["1"])
+    assert (entry["index"], entry["ego"], entry["vehicles"]) == (8, "2", ["1"])
 
 
 @pytest.mark.parametrize(
