@@ -1,31 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of the fitting.
+"""The parameters of the fitting."""
 
-Among them the parts of a recorded encounter that a fit may lose: turns, conflicts, lanes,
-passings.
-"""
-
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.roads import lights_of, PlaceLimits
-from scenario_gen.situation import FOLLOW_UP_S, LEAD_S, LOSABLE, Track
-from scenario_gen.types import LaneNetwork, Loss, Road, SignalStop
-
-Tracks = tuple[Track, ...]
-
-
-_EXTRAPOLATION_M = 30.0  # beyond the end of a path, straight on
-
-
-class LostEncounterError(RefusedError):
-    """The recording fits the road, but a part of its encounter would be lost there."""
+from scenario_gen.roads import PlaceLimits
+from scenario_gen.situation import FOLLOW_UP_S, LEAD_S, LOSABLE
 
 
 def allowed_losses(allow: str) -> frozenset[str]:
@@ -42,51 +25,6 @@ def allowed_losses(allow: str) -> frozenset[str]:
                 f"parameter allow has {name!r}; choose from {', '.join(known)}, with commas"
             )
     return frozenset(known[name] for name in names)
-
-
-def refuse_lost(losses: Iterable[Loss], allow: str, road: str) -> None:
-    """Refuse a fit with losses that `allow` does not name.
-
-    Raises:
-        LostEncounterError: it has some; the message names the vehicles and the parameter.
-    """
-    allowed = allowed_losses(allow)
-    refused = [loss for loss in losses if loss.kind in LOSABLE and loss.kind not in allowed]
-    if refused:
-        kinds = sorted(allowed | {loss.kind for loss in refused})
-        names = ",".join(f"lost_{kind}" for kind in kinds)
-        reasons = "; ".join(loss.message for loss in refused)
-        raise LostEncounterError(
-            f"road {road} has nowhere this encounter fits unchanged: {reasons}; "
-            f"fitting.allow={names} accepts this"
-        )
-
-
-def find_unused(network: LaneNetwork, used: Iterable[int]) -> tuple[Loss, ...]:
-    """Return the loss of arms of a drawn junction without vehicles, given the used lanes."""
-    arms = network.arms
-    arm_of = {k: arm for arm, lanes in arms.items() for k in lanes}
-    unused = len(arms) - len({arm_of[k] for k in used if k in arm_of})
-    if len(arms) < 3 or not unused:
-        return ()
-    are = "is" if unused == 1 else "are"
-    message = (
-        f"{unused} of the {len(arms)} arms of road {network.name} {are} unused: no recorded "
-        "vehicle enters or leaves there"
-    )
-    return (Loss("arm", (), message),)
-
-
-def lost_lights(stops: Iterable[SignalStop], placed: Tracks, road: Road) -> Iterator[Loss]:
-    """Yield the stops at red of a recording where a road has no light."""
-    network = road.lanes
-    lights = lights_of(network) if network is not None and network.rules_kept else ()
-    for stop in stops:
-        curve, name = placed[stop.who].curve, placed[stop.who].vehicle.id
-        points = curve.at(np.arange(0.0, curve.length + _EXTRAPOLATION_M, 0.5))
-        if stop.stands and not any(light.leads_over(points[:, :2]) for light in lights):
-            message = f"vehicle {name} stops at red, and the road has no light there"
-            yield Loss("light", (name,), message)
 
 
 @dataclass(frozen=True)

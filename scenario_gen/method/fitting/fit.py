@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The fitting: how a recording is placed on a road.
+"""The fitting: how a recording is placed on a road, and what of the encounter it loses there.
 
 Each vehicle follows a chain of lanes, if the road has lanes.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
@@ -14,7 +15,7 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.fitting.config import find_unused, FittingConfig, lost_lights, refuse_lost
+from scenario_gen.method.fitting.config import allowed_losses, FittingConfig
 from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,
@@ -29,6 +30,7 @@ from scenario_gen.roads import (
     ground_for,
     lane_graph,
     LanePath,
+    lights_of,
     nearest_pose_with_room,
     share_with_room,
     users_of,
@@ -36,6 +38,7 @@ from scenario_gen.roads import (
 from scenario_gen.situation import (
     drivers_of,
     find_losses,
+    LOSABLE,
     manoeuvre_of,
     refuse_reversing,
     Situation,
@@ -48,13 +51,68 @@ from scenario_gen.types import (
     Fit,
     FittedVehicle,
     LaneNetwork,
+    Loss,
     Note,
     NoteKind,
     Request,
     Road,
     Segmentation,
+    SignalStop,
     TypeLimits,
 )
+
+_EXTRAPOLATION_M = 30.0  # beyond the end of a path, straight on
+
+
+class LostEncounterError(RefusedError):
+    """The recording fits the road, but a part of its encounter would be lost there."""
+
+
+def refuse_lost(losses: Iterable[Loss], allow: str, road: str) -> None:
+    """Refuse a fit with losses that `allow` does not name.
+
+    Raises:
+        LostEncounterError: it has some; the message names the vehicles and the parameter.
+    """
+    allowed = allowed_losses(allow)
+    refused = [loss for loss in losses if loss.kind in LOSABLE and loss.kind not in allowed]
+    if refused:
+        kinds = sorted(allowed | {loss.kind for loss in refused})
+        names = ",".join(f"lost_{kind}" for kind in kinds)
+        reasons = "; ".join(loss.message for loss in refused)
+        raise LostEncounterError(
+            f"road {road} has nowhere this encounter fits unchanged: {reasons}; "
+            f"fitting.allow={names} accepts this"
+        )
+
+
+def find_unused(network: LaneNetwork, used: Iterable[int]) -> tuple[Loss, ...]:
+    """Return the loss of arms of a drawn junction without vehicles, given the used lanes."""
+    arms = network.arms
+    arm_of = {k: arm for arm, lanes in arms.items() for k in lanes}
+    unused = len(arms) - len({arm_of[k] for k in used if k in arm_of})
+    if len(arms) < 3 or not unused:
+        return ()
+    are = "is" if unused == 1 else "are"
+    message = (
+        f"{unused} of the {len(arms)} arms of road {network.name} {are} unused: no recorded "
+        "vehicle enters or leaves there"
+    )
+    return (Loss("arm", (), message),)
+
+
+def lost_lights(
+    stops: Iterable[SignalStop], placed: tuple[Track, ...], road: Road
+) -> Iterator[Loss]:
+    """Yield the stops at red of a recording where a road has no light."""
+    network = road.lanes
+    lights = lights_of(network) if network is not None and network.rules_kept else ()
+    for stop in stops:
+        curve, name = placed[stop.who].curve, placed[stop.who].vehicle.id
+        points = curve.at(np.arange(0.0, curve.length + _EXTRAPOLATION_M, 0.5))
+        if stop.stands and not any(light.leads_over(points[:, :2]) for light in lights):
+            message = f"vehicle {name} stops at red, and the road has no light there"
+            yield Loss("light", (name,), message)
 
 
 def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:

@@ -11,7 +11,7 @@ from support.reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
-from scenario_gen.method.fitting.config import find_unused
+from scenario_gen.method.fitting.fit import find_unused
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve

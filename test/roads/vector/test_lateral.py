@@ -11,8 +11,7 @@ from support.map_builders import write
 from support.textbook_motions import driven, line, ramps
 
 from scenario_gen import generate
-from scenario_gen.method.fitting import fit_template
-from scenario_gen.method.fitting.config import LostEncounterError
+from scenario_gen.method.fitting import fit_template, LostEncounterError
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.stage import checker_of
