@@ -67,3 +67,21 @@ def test_kind_ignores_direction_and_order(turned, case):
         "straight",
     )
     assert kind_of(encounter, 0, 1) == kind == kind_of(encounter, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("on_path", "kind"), [(13, EncounterKind.OTHER), (15, EncounterKind.FOLLOWING)]
+)
+def test_followers_share_seven_tenths_of_path(on_path, kind):
+    """Of the 20 samples of the last quarter; afterwards the follower is beside that path."""
+    x = 3.0 * np.arange(80)
+    beside = np.where(np.arange(80) >= 60 + on_path, 5.0, 0.0)
+    encounter = Encounter.sampled(
+        (Vehicle("1"), Vehicle("2")),
+        0.3,
+        np.stack([np.column_stack([x + 40.0, np.zeros(80)]), np.column_stack([x, beside])]),
+        np.zeros((2, 80)),
+        np.full((2, 80), 10.0),
+        "leaves the path",
+    )
+    assert kind_of(encounter, 0, 1) == kind

