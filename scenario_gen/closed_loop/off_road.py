@@ -20,7 +20,7 @@ from scenario_gen.numerics import Bools, edge_lengths, Floats
 from scenario_gen.numerics.boxes import Box, box_distance, box_gap, corners
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import F, F2, kernel
-from scenario_gen.roads import footprint_fits, to_cells
+from scenario_gen.roads import to_cells
 from scenario_gen.roads.clearance import footprint_free, is_open
 from scenario_gen.types import Motion, Obstacle, Road
 
@@ -63,20 +63,18 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     if out[0, 0] == Proof.PROVEN:
         return RoadUse(max(_room(road, motion.poses[0], half), RESOLUTION_S), math.nan)
 
-    def is_out(time: Floats) -> Bools:
-        return _is_out(road, motion.at(time).poses[0], half, limit)
+    def first_out(time: Floats) -> int:
+        return _first_out(road, motion.at(time).poses[0], half, limit)
 
-    out_at = is_out(motion.time)
-    first_out = motion.time[np.argmax(out_at)] if out_at.any() else motion.time[-1]
-    time = _fine_times(motion)  # from then on the samples suffice
-    time = np.union1d(time[time <= first_out], motion.time)
-    reached = is_out(time)
+    time = _fine_times(motion)
+    last = motion.time[first_out(motion.time)]  # the last sample, if none is out
+    time = np.union1d(time[time <= last], motion.time)
     begin = math.nan
-    if reached.any():
-        k = int(np.argmax(reached))
+    k = first_out(time)
+    if k >= 0:
         between = np.linspace(time[max(k - 1, 0)], time[k], SUBSTEPS_COUNT + 1)
-        begin = float(between[np.argmax(is_out(between))])
-    depth = _depth(road, motion.at(time).poses[0], half, 0.0, MAX_DEPTH_M)
+        begin = float(between[first_out(between)])
+    depth = _depth(road, motion.at(time).poses[0], half)
     return RoadUse(-depth, begin)
 
 
@@ -110,7 +108,7 @@ def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: floa
     if 0 <= column < width and 0 <= row < height:
         room = road.clearance_cells[row, column] - _HALF_DIAGONAL_CELLS
         has_room = bool(room * road.resolution > math.hypot(*half))
-    if not has_room and _is_out(road, pose[None], half, limit)[0]:
+    if not has_room and _first_out(road, pose[None], half, limit) == 0:
         return True
     return bool(road.obstacles) and bool(_touches(road, pose[None], half).any())
 
@@ -135,25 +133,21 @@ def _in_cells(road: Road, poses: Floats) -> Floats:
     return np.concatenate((to_cells(road, poses[:, :2]), poses[:, 2:3]), axis=1)
 
 
-def _is_out(road: Road, poses: Floats, half: tuple[float, float], limit: float) -> Bools:
-    """Return (P,) whether a footprint is outside by more than 0 and at least a limit [m]."""
-    out = ~footprint_fits(road, poses[:, :3], 2.0 * half[0], 2.0 * half[1])
-    known, enough = max(limit - DEPTH_ERROR_M, 0.0), max(limit, RESOLUTION_S)
-    out[out] = [_depth(road, pose[None], half, known, enough) >= enough for pose in poses[out]]
-    return out
+def _first_out(road: Road, poses: Floats, half: tuple[float, float], limit: float) -> int:
+    """Return the first of poses (P, 3) at which a footprint is off the road; -1 without any.
 
-
-def _depth(
-    road: Road, poses: Floats, half: tuple[float, float], known: float, enough: float
-) -> float:
-    """Return how far [m] a footprint at poses (P, 3) is outside at most, or a known depth.
-
-    The search ends at a depth that is enough.
+    It is outside by more than 0 and at least a limit [m].
     """
+    known, enough = max(limit - DEPTH_ERROR_M, 0.0), max(limit, RESOLUTION_S)
     lengths = np.array((*half, known, enough, MAX_DEPTH_M, DEPTH_ERROR_M)) / road.resolution
-    depth = (
-        greatest_depth(road.clearance_cells, _in_cells(road, poses), *lengths) * road.resolution
-    )
+    return int(first_deep(road.clearance_cells, _in_cells(road, poses), *lengths))
+
+
+def _depth(road: Road, poses: Floats, half: tuple[float, float]) -> float:
+    """Return how far [m] a footprint at poses (P, 3) is outside at most."""
+    size = road.resolution
+    lengths = np.array((*half, MAX_DEPTH_M, DEPTH_ERROR_M)) / size
+    depth = greatest_depth(road.clearance_cells, _in_cells(road, poses), *lengths) * size
     return float(min(depth, MAX_DEPTH_M))
 
 
@@ -222,8 +216,63 @@ def _halves(part: Box) -> tuple[Box, Box]:
     )
 
 
-@kernel(F2, F2, F, F, F, F, F, F)
+@kernel(inline=True)
+def _deeper(
+    clearance: Floats,
+    whole: Box,
+    yaw: float,
+    best: float,
+    enough: float,
+    farthest: float,
+    error: float,
+) -> float:
+    """Return how far points of a rectangle are at most from drivable squares, or `best` [cells].
+
+    Branch and bound: no point of a part of the rectangle is farther than its farthest corner from
+    the square that is nearest to its centre. The search ends at a depth that is enough.
+    """
+    parts = [whole]
+    while len(parts) > 0 and best < enough:
+        part = parts.pop()
+        if footprint_free(clearance, part.x, part.y, yaw, part.length, part.width):
+            continue
+        _, column, row = _nearest_open(clearance, part.x, part.y, farthest)
+        bound, x, y = _farthest_corner(part, column, row)
+        best = max(best, _nearest_open(clearance, x, y, farthest)[0])
+        if min(bound, farthest) > best + error:
+            parts.extend(_halves(part))
+    return best
+
+
+@kernel(F2, F2, F, F, F, F)
 def greatest_depth(
+    clearance: Floats,
+    poses: Floats,
+    half_length: float,
+    half_width: float,
+    farthest: float,
+    error: float,
+) -> float:
+    """Return how far points of a rectangle are at most from drivable squares (H, W) [cells].
+
+    Args:
+        clearance: (H, W) of the squares.
+        poses: (P, 3) of the rectangle: x, y, like all lengths in cells, and yaw [rad].
+        half_length: along the yaw.
+        half_width: across it.
+        farthest: a depth that is not exceeded.
+        error: of the depth.
+    """
+    best = 0.0
+    for p in range(len(poses) - 1, -1, -1):  # a drive off the road is deepest at its end
+        x, y, yaw = poses[p]
+        whole = Box(x, y, np.cos(yaw), np.sin(yaw), half_length, half_width)
+        best = _deeper(clearance, whole, yaw, best, farthest, farthest, error)
+    return best
+
+
+@kernel(F2, F2, F, F, F, F, F, F)
+def first_deep(
     clearance: Floats,
     poses: Floats,
     half_length: float,
@@ -232,36 +281,25 @@ def greatest_depth(
     enough: float,
     farthest: float,
     error: float,
-) -> float:
-    """Return how far points of a rectangle are at most from drivable squares (H, W) [cells].
-
-    Branch and bound: no point of a part of the rectangle is farther than its farthest corner from
-    the square that is nearest to its centre.
+) -> int:
+    """Return the first pose at which a rectangle is deep enough off the road; -1 without any.
 
     Args:
-        clearance: (H, W) of the squares.
-        poses: (P, 3) of the rectangle: x, y, like all lengths in cells, and yaw [rad].
-        half_length: along the yaw.
-        half_width: across it.
-        known: a depth that is returned if no point is deeper.
-        enough: a depth at which the search ends.
-        farthest: a depth that is not exceeded.
-        error: of the depth.
+        clearance: as in `greatest_depth`.
+        poses: as there.
+        half_length: as there.
+        half_width: as there.
+        known: a depth that is not enough, by the error.
+        enough: the depth [cells].
+        farthest: as there.
+        error: as there.
     """
-    best = known
     for p in range(len(poses)):
         x, y, yaw = poses[p]
-        parts = [Box(x, y, np.cos(yaw), np.sin(yaw), half_length, half_width)]
-        while len(parts) > 0 and best < enough:
-            part = parts.pop()
-            if footprint_free(clearance, part.x, part.y, yaw, part.length, part.width):
-                continue
-            _, column, row = _nearest_open(clearance, part.x, part.y, farthest)
-            bound, x, y = _farthest_corner(part, column, row)
-            best = max(best, _nearest_open(clearance, x, y, farthest)[0])
-            if min(bound, farthest) > best + error:
-                parts.extend(_halves(part))
-    return best
+        whole = Box(x, y, np.cos(yaw), np.sin(yaw), half_length, half_width)
+        if _deeper(clearance, whole, yaw, known, enough, farthest, error) >= enough:
+            return p
+    return -1
 
 
 @kernel(F2, F2, F, F, F)

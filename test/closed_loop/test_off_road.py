@@ -43,9 +43,7 @@ def test_depth_is_of_the_deepest_point(seed):
     poses = np.column_stack(
         [rng.uniform(-2.0, 30.0 * res + 2.0, (20, 2)), rng.uniform(-3.0, 3.0, 20)]
     )
-    measured = [
-        _depth(road_of(drivable, res), pose[None], HALF, 0.0, MAX_DEPTH_M) for pose in poses
-    ]
+    measured = [_depth(road_of(drivable, res), pose[None], HALF) for pose in poses]
     expected = [plain(drivable, res, pose) for pose in poses]
     assert measured == pytest.approx(expected, abs=0.014)  # a point may lie between two of 2 cm
     assert np.ptp(expected) > 0.5
@@ -79,5 +77,5 @@ def test_drive_beside_and_over_the_edge():
 def test_post_under_car_has_centre_depth():
     drivable = np.ones((60, 60), dtype=np.bool_)
     drivable[20:24, 20:24] = False  # 0.8 m wide
-    depth = _depth(road_of(drivable, 0.2), np.array([[4.7, 4.3, 0.4]]), HALF, 0.0, MAX_DEPTH_M)
+    depth = _depth(road_of(drivable, 0.2), np.array([[4.7, 4.3, 0.4]]), HALF)
     assert depth == pytest.approx(0.4, abs=0.001)

@@ -34,6 +34,21 @@ def test_copies_move_all_vehicles_alike():
     ) == 5
 
 
+@pytest.mark.parametrize(("shift_m", "original"), [(0.098, "a"), (0.102, "")])
+def test_copies_are_within_ten_centimetres(shift_m, original):
+    """Only the other vehicle is moved, straight ahead in the frame of the ego."""
+    scenario = draw_scenario(1)
+    position = scenario.position.copy()
+    position[1] += shift_m * np.array(
+        [np.cos(scenario.heading[0, 0]), np.sin(scenario.heading[0, 0])]
+    )
+    trials = [
+        Trial(name, each, 0, None, "x")
+        for name, each in (("a", scenario), ("b", replace(scenario, position=position)))
+    ]
+    assert origins_of(trials)[1].copy_of == original
+
+
 def test_drives_count_by_encounter_copies_once():
     names = ["a", "b", "c"]
     unit, encounters = units_of(names, [Origin("x"), Origin("x", "", "a"), Origin("x")])

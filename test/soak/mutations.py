@@ -46,6 +46,10 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
     ("scenario_gen/closed_loop/search/settings.py", "prior_precision: float = (0.45)"): (
         "any prior of the allocation: the weights keep the estimate unbiased"
     ),
+    (
+        "scenario_gen/closed_loop/driver_traits.py",
+        "headway = (config.headway / np.exp(HEADWAY_SPREAD_RATIO * draws.standard_normal()))",
+    ): "the logarithm is distributed evenly about zero",
     ("scenario_gen/situation/tracks.py", "NOISE_STEP_RATIO = (1.26)"): (
         "a step of a grid: another one takes its place, within the same deviation"
     ),
@@ -91,6 +95,8 @@ def changed(node: ast.AST) -> Iterator[ast.expr]:
             yield ast.Constant(0.9 * value)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             yield operand
+        case ast.BinOp(right=ast.Constant(value=str())):
+            return  # a text
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             yield ast.BinOp(left, OPERATORS[type(op)](), right)
             if isinstance(op, ast.Add | ast.Sub):
