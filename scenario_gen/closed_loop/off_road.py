@@ -8,6 +8,7 @@ if it reports an exit, the depth is measured, at poses so close together that no
 footprint moves more than POSE_SPACING_M from one to the next.
 """
 
+from bisect import bisect_left
 import math
 from typing import Any, NamedTuple
 
@@ -73,7 +74,8 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     k = first_out(time)
     if k >= 0:
         between = np.linspace(time[max(k - 1, 0)], time[k], SUBSTEPS_COUNT + 1)
-        begin = float(between[first_out(between)])
+        substeps = range(SUBSTEPS_COUNT)
+        begin = float(between[bisect_left(substeps, 0, key=lambda n: first_out(between[[n]]))])
     depth = _depth(road, motion.at(time).poses[0], half)
     return RoadUse(-depth, begin)
 
