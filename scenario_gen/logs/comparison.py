@@ -138,9 +138,8 @@ class Comparison:
         """Return whether a share of displacements is off for more than a few vehicles."""
         values = getattr(self, name)
         known = values[np.isfinite(values)]
-        return bool(
-            len(known) and (known > EVIDENCE.off_share).mean() > 1.0 - EVIDENCE.agreeing_share
-        )
+        is_agreeing = known <= EVIDENCE.off_share
+        return bool(len(known) and is_agreeing.mean() < EVIDENCE.agreeing_share)
 
 
 def _compare(legs: Legs, n_vehicles: int) -> Comparison:

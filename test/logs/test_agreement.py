@@ -19,7 +19,7 @@ def compared(**values):
 @pytest.mark.parametrize("name", ["speed_off", "heading_off", "course_off"])
 @pytest.mark.parametrize(
     ("count", "share", "contradicts"),
-    [(1, 0.5, False), (3, 0.5, True), (3, 0.11, True), (20, 0.09, False), (0, 0.5, False)],
+    [(2, 0.5, False), (3, 0.5, True), (3, 0.11, True), (20, 0.1, False), (0, 0.5, False)],
 )
 def test_more_than_a_tenth_contradicts(name, count, share, contradicts):
     """Of the vehicles, each with more than a tenth of its displacements."""

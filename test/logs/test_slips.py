@@ -173,6 +173,17 @@ def test_table_is_read_as_driven(tmp_path, change, columns, said, options):
     )
 
 
+@pytest.mark.parametrize(("aside_share", "is_noted"), [(0.05, False), (0.15, True)])
+def test_velocities_ahead_are_of_bodies(tmp_path, aside_share, is_noted):
+    """Velocities with vy = 0 nearly always; in the frame of the map they contradict the one that drives north."""
+    rows = crossing()
+    turned = np.arange(len(rows)) % 20 < 20 * aside_share
+    velocity = {"vx_mps": rows.speed_mps * ~turned, "vy_mps": rows.speed_mps * turned}
+    rows = rows.drop(columns="speed_mps").assign(**velocity)
+    notes = " ".join(read_log(save(rows, tmp_path), LogConfig(strict=False)).quality.notes)
+    assert ("recorded velocities are far off" in notes) == is_noted
+
+
 SAID = {  # what is read, but looks otherwise
     "knots": (
         lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852),

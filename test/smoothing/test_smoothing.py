@@ -152,6 +152,15 @@ def test_stuck_speed_sensor_stops_no_car():
     assert np.abs(smooth.position[:, 0] - place).max() < 1.5
 
 
+@pytest.mark.parametrize(("rolling_mps", "still_count"), [(0.095, 50), (0.105, 30)])
+def test_standing_car_does_not_roll(rolling_mps, still_count):
+    """A second on either side of a stand is part of it below 0.1 m/s only."""
+    speed = np.repeat([5.0, rolling_mps, 0.0, rolling_mps, 5.0], [10, 10, 30, 10, 10])
+    seconds = 0.1 * np.arange(len(speed))
+    stands = standing(seconds, seconds, np.zeros((len(speed), 2)), seconds, speed)
+    assert stands.sum() == still_count
+
+
 def test_coloured_noise_counts_more_than_white():
     rng = np.random.Generator(np.random.PCG64(5))
     white = rng.normal(0.0, 1.0, 20_000)

@@ -24,6 +24,7 @@ from scenario_gen.method.sampling.speed_profile.mean import (
 from scenario_gen.method.sampling.speed_profile.model import kernel_root, SpeedModel
 from scenario_gen.method.sampling.speed_profile.spline import (
     KNOT_SPACING_S,
+    least_shares,
     lengthened_waits,
     MIN_WAIT_S,
     SpeedSpline,
@@ -242,6 +243,17 @@ def test_short_waits_are_lengthened(seconds):
     assert end - start == pytest.approx(max(seconds, MIN_WAIT_S))
     assert start + end == pytest.approx(12.0 + seconds)
     assert lengthened_waits(1, waits, creeping=True) == [(12.0, 15.0)]
+
+
+def test_fast_clock_keeps_a_wait():
+    """Sampled at 10 Hz in any phase, it stands for the 1 s of a wait; no clock has to be slower for it."""
+    ((start, end),) = lengthened_waits(0, [Wait(0, 5.0, 5.3)], creeping=False)
+    (share,) = least_shares(np.array([5.15]), [Wait(0, 5.0, 5.3)])
+    assert share < 1.0
+    shortest = (end - start) * share
+    for phase in np.linspace(0.0, 0.1, 101):
+        count = np.count_nonzero(np.arange(phase, 4.0, 0.1) <= shortest)
+        assert 0.1 * (count - 1) > 1.0 - 1e-9
 
 
 def test_standing_end_has_no_speed():
