@@ -23,12 +23,12 @@ def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:
     return bool(footprint_fits(ground, poses, vehicle.length, vehicle.width).all())
 
 
-def share_with_room(road: Road, track: Track, every: int = 5) -> float:
+def share_with_room(road: Road, track: Track) -> float:
     """Return the share of a track's samples at which its footprint has room.
 
-    Every n-th sample and the last one are looked at.
+    Every fifth sample and the last one are looked at.
     """
-    poses = np.concatenate((track.poses[:-1:every], track.poses[-1:]))
+    poses = np.concatenate((track.poses[:-1:5], track.poses[-1:]))
     vehicle = track.vehicle
     fits = footprint_fits(ground_for(road, vehicle), poses, vehicle.length, vehicle.width)
     return float(fits.mean())

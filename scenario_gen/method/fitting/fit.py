@@ -17,6 +17,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import allowed_losses, FittingConfig
 from scenario_gen.method.fitting.placement import (
+    end_speeds,
     place_given,
     place_in_own_frame,
     Placement,
@@ -178,6 +179,7 @@ def assemble_fit(
     index = frozen_ints(np.concatenate(([0], segmentation.changepoints, [last])))
     if given is None:
         given = np.full((len(placement.tracks), 2, 4), np.nan)
+    speeds = end_speeds(encounter, placement.scale[:, None])
     notes = list(placement.notes)
     fitted, states = [], []
     for i, track in enumerate(placement.tracks):
@@ -204,25 +206,16 @@ def assemble_fit(
         path = _path(track)
         fitted.append(FittedVehicle(anchors, moved, stands, scale, manoeuvre, turns, path))
 
-        speeds = encounter.speed[i, [0, last]] * scale
-        speeds = _end_speeds(speeds, given[i], still=track.still)
-        states.append(np.column_stack((anchors[[0, -1]], speeds)))
+        requested = np.where(np.isfinite(given[i, :, 0]), given[i, :, 3], speeds[i])
+        states.append(np.column_stack((anchors[[0, -1]], requested * (not track.still))))
     start, end = np.stack(states, axis=1)
-    requested = BoundaryStates(start=start, end=end)
+    ends = BoundaryStates(start=start, end=end)
     losses = (
         *find_losses(situation.tracks, placement.tracks),
         *lost_lights(situation.reactions.stops, placement.tracks, road),
         *placement.unused,
     )
-    return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), losses)
-
-
-def _end_speeds(speeds: Floats, given: Floats, *, still: bool) -> Floats:
-    """Return the speeds (2,) [m/s] at start and end: recorded ones, or given states (2, 4)."""
-    if still:
-        return np.zeros(2)
-    slow = np.where(speeds < STANDING_SPEED_MPS, 0.0, speeds)
-    return np.where(np.isfinite(given[:, 0]), given[:, 3], slow)
+    return Fit(encounter.vehicles, tuple(fitted), index, ends, tuple(notes), losses)
 
 
 def _with_given_ends(anchors: Floats, progress: Floats, given: Floats, *, still: bool) -> Floats:

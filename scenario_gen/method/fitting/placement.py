@@ -104,10 +104,10 @@ def place_given(
     encounter, tracks = situation.encounter, situation.tracks
     ends = np.stack((starts, goals), axis=1)
     is_given: Bools = np.isfinite(ends[..., 0])
-    ends[..., 3] = np.where(np.isnan(ends[..., 3]), _end_speeds(encounter), ends[..., 3])
+    ends[..., 3] = np.where(np.isnan(ends[..., 3]), end_speeds(encounter), ends[..., 3])
     if base is not None:
         poses = np.stack([track.poses[[0, -1]] for track in base.tracks])
-        speed = _end_speeds(encounter, base.scale[:, None])
+        speed = end_speeds(encounter, base.scale[:, None])
         base_ends = np.concatenate((poses, speed[..., None]), axis=-1)
         ends = np.where(is_given[..., None], ends, base_ends)
     placed: list[Track] = []
@@ -131,7 +131,7 @@ def _note(track: Track, is_given: Bools, method: str) -> Note:
     return Note.of(NoteKind.STATE_GIVEN, vehicle=track.vehicle.id, states=states, method=method)
 
 
-def _end_speeds(encounter: Encounter, scale: Floats | float = 1.0) -> Floats:
+def end_speeds(encounter: Encounter, scale: Floats | float = 1.0) -> Floats:
     """Return the scaled speeds (N, 2) [m/s] at both ends; 0 for vehicles that stand."""
     speed = encounter.speed[:, [0, -1]] * scale
     return np.where(speed < STANDING_SPEED_MPS, 0.0, speed)

@@ -11,10 +11,11 @@ pattern search on the fine field. The recording moves as one piece, so all meeti
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 import math
+from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import correlate
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
@@ -35,19 +36,17 @@ _COMFORT_M = 0.7  # of room beyond the margin that is preferred
 _COST_UNIT_COUNT = 2**20  # units of cost per 1, so that sums of costs are whole numbers
 
 
-@dataclass(frozen=True, eq=False)
-class _Similarity:
-    """A scale, a rotation [rad] about the recording's centre, and the place (2,) [m] of it."""
+class _Similarity(NamedTuple):
+    """A rotation [rad] about the recording's centre, its place x, y [m] on the map, and a scale.
+
+    They are ordered by cost.
+    """
 
     cost: float
-    scale: float
     yaw: float
-    centre: tuple[float, float]
-
-    @property
-    def rank(self) -> tuple[float, float, tuple[float, float]]:
-        """Order by cost, and else in a fixed order."""
-        return self.cost, self.yaw, self.centre
+    x: float
+    y: float
+    scale: float
 
     def note(self, road: Road) -> Note:
         """Return the note on a placement by it."""
@@ -56,8 +55,8 @@ class _Similarity:
             road=road.name,
             degrees=np.degrees(self.yaw) % 360.0,
             scale=self.scale,
-            x=self.centre[0],
-            y=self.centre[1],
+            x=self.x,
+            y=self.y,
         )
 
 
@@ -130,13 +129,11 @@ class _GridSearch:
     def candidates(self, config: FittingConfig) -> Iterator[_Similarity]:
         """Yield the best similarities with each accepted scale, the best first."""
         for scale in config.place_limits.scales:
-            coarse = sorted(self._coarse(scale), key=lambda each: each.rank)
-            refined = map(self._refined, coarse[:10])
-            yield from sorted(refined, key=lambda each: each.rank)
+            yield from sorted(map(self._refined, sorted(self._coarse(scale))[:10]))
 
     def moved(self, tracks: tuple[Track, ...], similarity: _Similarity) -> tuple[Track, ...]:
         """Return tracks on the map."""
-        pose = np.array([*similarity.centre, similarity.yaw])
+        pose = np.array([similarity.x, similarity.y, similarity.yaw])
         moved = []
         for track in tracks:
             points = track.curve.points.copy()
@@ -158,43 +155,35 @@ class _GridSearch:
         """Cells of the grid per coarse cell."""
         return max(round(_COARSE_CELL_M / self.road.resolution), 1)
 
-    @cached_property
     def _coarse_field(self) -> Floats:
-        """(H, W) the penalty in coarse cells, less that of blocked cells.
+        """Return (H, W) the penalty in coarse cells, less that of blocked cells.
 
-        Space outside the map counts as blocked, and is zero in the sum.
+        It is in whole units of cost. Space outside the map counts as blocked, and is zero.
         """
         every = slice(self._stride // 2, None, self._stride)
         field = self._penalty(self.road.clearance_at(every, every))
-        return field - float(self._penalty(np.zeros(1))[0])
-
-    @cached_property
-    def _spectrum(self) -> Floats:
-        """The Fourier transform of the coarse field in whole units of cost."""
-        return np.asarray(np.fft.rfft2(np.round(self._coarse_field * _COST_UNIT_COUNT)))
+        blocked = float(self._penalty(np.zeros(1))[0])
+        return np.asarray(np.round((field - blocked) * _COST_UNIT_COUNT))
 
     def _coarse(self, scale: float) -> Iterator[_Similarity]:
         """Yield the best translation of each rotation."""
-        shape = self._coarse_field.shape
+        field = self._coarse_field()
         cell = self._stride * self.road.resolution
         for yaw in np.arange(_ROTATION_COUNT) * 2.0 * np.pi / _ROTATION_COUNT:
             points = place(np.array([0.0, 0.0, yaw]), *(scale * self.discs).T)
             index = np.floor(points / cell + 0.5).astype(np.int64)
             low, size = index.min(axis=0), np.ptp(index, axis=0) + 1
-            if size[0] > shape[1] or size[1] > shape[0]:
+            if size[0] > field.shape[1] or size[1] > field.shape[0]:
                 continue
             kernel = np.zeros((size[1], size[0]))
             np.add.at(kernel, (index[:, 1] - low[1], index[:, 0] - low[0]), 1.0)
             # The sums are whole numbers: rounding removes what depends on the CPU.
-            product = np.fft.irfft2(
-                self._spectrum * np.fft.rfft2(kernel[::-1, ::-1], shape), shape
-            )
-            total = np.round(product[size[1] - 1 :, size[0] - 1 :])
+            total = np.round(correlate(field, kernel, "valid", "fft"))
             row, column = np.unravel_index(int(np.argmin(total)), total.shape)
             cost = float(np.round(total[row, column] / (_COST_UNIT_COUNT * len(points)), 9))
             first = (self._stride // 2 + 0.5) * self.road.resolution
             centre = self.road.origin + np.array([column - low[0], row - low[1]]) * cell + first
-            yield _Similarity(cost, scale, float(yaw), (float(centre[0]), float(centre[1])))
+            yield _Similarity(cost, float(yaw), float(centre[0]), float(centre[1]), scale)
 
     def _refined(self, coarse: _Similarity) -> _Similarity:
         """Return the best similarity near one, with the same scale."""
@@ -205,8 +194,8 @@ class _GridSearch:
             clearance = np.where(inside, self.road.clearance_at(row, column), 0.0)
             return np.asarray(self._penalty(clearance).mean(axis=1))
 
-        start = np.array([[*coarse.centre, coarse.yaw]])
+        start = np.array([[coarse.x, coarse.y, coarse.yaw]])
         steps = np.array([1.0, 1.0, np.radians(3.0)])
         states, (cost,) = pattern_search(costs, start, steps, 0.05)
         x, y, yaw = states[0].tolist()
-        return _Similarity(float(cost), coarse.scale, yaw, (x, y))
+        return _Similarity(float(cost), yaw, x, y, coarse.scale)
