@@ -357,17 +357,14 @@ class _RoadDrawing:
 
     def _add_routes_between_ends(self) -> None:
         """Add straight routes whose mouths are too near to each other as driven ones."""
+        arms, config = self._plan.arms, self._config
         for connection in self._straight_connections():
             if self._route(connection) is None:
-                route = self._route_between_ends(connection)
+                a, i, b, j = connection
+                start = arms[a].lane(i, config, inward=True)
+                route = _possible_route(start, arms[b].lane(j, config, inward=False))
                 if route is not None:
                     self._driven[connection] = route
-
-    def _route_between_ends(self, connection: Connection) -> Curve | None:
-        """Return the route between the ends of two lanes; None if cars cannot drive it."""
-        a, i, b, j = connection
-        start = self._plan.arms[a].lane(i, self._config, inward=True)
-        return _possible_route(start, self._plan.arms[b].lane(j, self._config, inward=False))
 
     def _route(self, connection: Connection) -> Curve | None:
         """Return the route between two lanes at their mouths; None if cars cannot drive it."""

@@ -29,10 +29,6 @@ class NoteKind(Enum):
         "{latitude:.7f}, {longitude:.7f} (azimuthal equidistant, WGS84)"
     )
     FAULTY = "{count} faulty {elements} left out ({names}), first: {reason}"
-    LINKS_LEFT_OUT = (
-        "{count} links left out: they join lane ends more than {distance:g} m apart, "
-        "first at {place}"
-    )
     OTHER_LANES = "{count} lanes are closed to cars: {users}"
     UNUSED_LANES = "{count} lanes left out: no supported road user may use them"
     UNREAD_SIGNS = "{count} signs left out: not stop, give way, priority or speed limit"

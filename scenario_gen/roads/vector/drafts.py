@@ -56,8 +56,8 @@ class Faults:
 
     @property
     def first_reason(self) -> str:
-        """The reason of the first fault, "" without one."""
-        return self.faults[0].reason if self.faults else ""
+        """The reason of the first fault, "" without one; a faulty link costs no lane."""
+        return next((fault.reason for fault in self.faults if fault.kind != "link"), "")
 
     def add(self, kind: str, name: str, reason: str) -> None:
         """Add a fault."""

@@ -100,22 +100,16 @@ class LaneGraph:
         """Return the lanes that follow a chain and are not part of it."""
         return [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
 
-    def closed_to(self, track: Track) -> frozenset[int]:
-        """Return the lanes that a vehicle may not use."""
-        users = track.vehicle.kind.lane_user
+    def closed_to(self, users: frozenset[str]) -> frozenset[int]:
+        """Return the lanes that some users may not use."""
         if users not in self._closed:
-            self._closed[users] = self._lanes_closed_to(users)
+            lanes = enumerate(self.network.lanes)
+            self._closed[users] = frozenset(k for k, lane in lanes if not lane.open_to(users))
         return self._closed[users]
 
     def reserved_for(self, track: Track) -> frozenset[int]:
         """Return the lanes that a vehicle may use and cars may not."""
-        if CARS not in self._closed:
-            self._closed[CARS] = self._lanes_closed_to(CARS)
-        return self._closed[CARS] - self.closed_to(track)
-
-    def _lanes_closed_to(self, users: frozenset[str]) -> frozenset[int]:
-        lanes = enumerate(self.network.lanes)
-        return frozenset(k for k, lane in lanes if not lane.open_to(users))
+        return self.closed_to(CARS) - self.closed_to(track.vehicle.kind.lane_user)
 
     def near(self, pose: Floats) -> list[int]:
         """Return the lanes that pass a pose (3,) x, y [m], yaw [rad] in about its direction.

@@ -26,6 +26,7 @@ from scenario_gen.roads.vector.drafts import (
     Draft,
     Faults,
     MapLanes,
+    MPS_PER_UNIT,
     refuse_too_long,
     refuse_too_many_lanes,
     speed_of,
@@ -35,7 +36,6 @@ from scenario_gen.roads.vector.osm_tags import tags_of, users_of_tags, value_of_
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import CARS, DRIVERS, RuleKind
 
-_KMH_FACTOR = 1.0 / 3.6
 _DEFAULT_LIMITS_KMH = {
     ("road", "urban"): 50.0,
     ("road", "nonurban"): 100.0,
@@ -458,5 +458,5 @@ def _speed_limit(lanelet: _Relation, limits: dict[str, float]) -> float:
     refs = [member.get("ref", "") for member in lanelet.element.findall("member")]
     signed = [limits[ref] for ref in refs if not math.isnan(limits.get(ref, math.nan))]
     place = lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")
-    default = _DEFAULT_LIMITS_KMH.get(place, math.nan) * _KMH_FACTOR
+    default = _DEFAULT_LIMITS_KMH.get(place, math.nan) * MPS_PER_UNIT["km/h"]
     return min(signed, default=default)

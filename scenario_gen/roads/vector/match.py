@@ -200,7 +200,7 @@ def _candidates(
 
     They lead over the lane with the id `ends[1]`, or over one near the last pose, if there is any.
     """
-    closed = graph.closed_to(track)
+    closed = graph.closed_to(track.vehicle.kind.lane_user)
     named = [
         [k for k, lane in enumerate(graph.network.lanes) if lane.id == name] if name else []
         for name in ends

@@ -71,7 +71,7 @@ def lanes_of(root: Element) -> MapLanes:
     lanes = [lane for road in roads.values() for lane in road.lanes]
     return MapLanes(
         drafts,
-        (*_coordinate_notes(root), *links.notes()),
+        tuple(_coordinate_notes(root)),
         unsupported=sum(lane.is_car_lane and not lane.users for lane in lanes),
         faults=faults,
         rules=[*signal_rules(roads, faults), *priorities(root, roads)],
@@ -86,7 +86,7 @@ def _roads(root: Element, faults: Faults) -> dict[str, OpenDriveRoad]:
         TooLargeError: they are too many or too long.
     """
     roads: dict[str, OpenDriveRoad] = {}
-    length, lane_count, point_count = 0.0, 0, 0
+    length, point_count = 0.0, 0
     max_length = MAX_SECTIONS_COUNT * CROSS_SECTION_STEP_M
     for name, element in by_id(root.findall("road"), faults).items():
         with faults.leaving_out("road", name):
@@ -96,8 +96,6 @@ def _roads(root: Element, faults: Faults) -> dict[str, OpenDriveRoad]:
                 km = max_length / 1000.0
                 raise TooLargeError(f"{element.place}: more than {km:g} km of roads; cut the map")
             road = road_of_sections(element, name, line, faults)
-            lane_count += sum(1 for _ in road.lanes)
-            refuse_too_many_lanes(lane_count, root.file)
             point_count += sum(len(lane.s) for lane in road.lanes)
             refuse_too_long(point_count, root.file)
             roads[name] = road
@@ -136,16 +134,6 @@ class LaneLinks:
         self.faults = faults
         self._roads = roads
         self._linked: dict[LaneEnd, list[LaneEnd]] = defaultdict(list)
-        self._gaps: list[str] = []  # places of links between ends that are far apart
-
-    def notes(self) -> list[Note]:
-        """Return a note on the links that were left out."""
-        if not self._gaps:
-            return []
-        count, first = len(self._gaps), self._gaps[0]
-        return [
-            Note.of(NoteKind.LINKS_LEFT_OUT, count=count, distance=_MAX_LINK_GAP_M, place=first)
-        ]
 
     def lane(self, key: Key) -> SectionLane | None:
         """Return the lane with a key, if there is one."""
@@ -224,7 +212,9 @@ class LaneLinks:
         if self.lane(a.key) is None or self.lane(b.key) is None:
             return
         if self._gap(a, b) > _MAX_LINK_GAP_M:
-            self._gaps.append(place)
+            names = (".".join(map(str, end.key)) for end in (a, b))
+            reason = f"{place}: their ends are more than {_MAX_LINK_GAP_M:g} m from each other"
+            self.faults.add("link", " to ".join(names), reason)
             return
         for end, other in ((a, b), (b, a)):
             if other not in self._linked[end]:
@@ -238,11 +228,9 @@ class LaneLinks:
 
 def _lane_end(road: OpenDriveRoad, contact: str, lane: int) -> LaneEnd:
     """Return the end of a lane at a road's start or end."""
-    if contact == "end":
-        section = road.next_section(len(road.sections), -1, lane)
-        return LaneEnd((road.id, section or 0, lane), 1)
-    section = road.next_section(-1, 1, lane)
-    return LaneEnd((road.id, section or 0, lane), 0)
+    outside, step, at = (len(road.sections), -1, 1) if contact == "end" else (-1, 1, 0)
+    section = road.next_section(outside, step, lane)
+    return LaneEnd((road.id, section or 0, lane), at)
 
 
 def _drafts(roads: dict[str, OpenDriveRoad], links: LaneLinks) -> Iterator[Draft]:

@@ -29,7 +29,7 @@ _MAX_STOP_LINE_DISTANCE_M = 15.0  # from its sign
 def signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[DraftRule]:
     """Yield the rules of signals where they are placed and where roads refer to them."""
     kinds: dict[str, RuleKind] = {}
-    for signal in _elements(roads, "signals/signal"):
+    for signal in _signals(roads):
         kind = _kind_of_signal(signal)
         if kind is not None:
             kinds[signal.get("id", "?")] = kind
@@ -53,14 +53,14 @@ def _rules_of_signal(
         yield DraftRule(signal.get("id", "?"), kind, (lane.name,), line=_cross_section(lane, s))
 
 
-def _elements(roads: dict[str, OpenDriveRoad], path: str) -> list[Element]:
-    """Return the elements below all roads along a path of tags."""
-    return [element for road in roads.values() for element in road.element.findall(path)]
+def _signals(roads: dict[str, OpenDriveRoad]) -> list[Element]:
+    """Return the signals of all roads."""
+    return [each for road in roads.values() for each in road.element.findall("signals/signal")]
 
 
 def other_signals(roads: dict[str, OpenDriveRoad]) -> int:
     """Return how many signals have a meaning that is not read."""
-    return sum(not _is_known(signal) for signal in _elements(roads, "signals/signal"))
+    return sum(not _is_known(signal) for signal in _signals(roads))
 
 
 def priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[DraftRule]:

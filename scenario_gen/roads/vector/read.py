@@ -3,7 +3,7 @@
 
 """Vector maps, `map.osm`, `map.xodr` or `map.xml`, and the part of them behind a `#`."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 import math
@@ -23,26 +23,12 @@ from scenario_gen.roads.vector.place import best_place, places
 from scenario_gen.situation import Track
 from scenario_gen.types import LaneNetwork, Note, NoteKind, Road
 
-
-@dataclass(frozen=True)
-class MapFormat:
-    """A format of vector maps.
-
-    Attributes:
-        name: of a file in it, with its article.
-        root: the name of its root element.
-    """
-
-    name: str
-    root: str
-
-
 FORMATS = {
-    ".osm": MapFormat("a Lanelet2 map", "osm"),
-    ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE"),
-    ".xml": MapFormat("a CommonRoad file", "commonRoad"),
+    ".osm": ("a Lanelet2 map", "osm"),
+    ".xodr": ("an OpenDRIVE map", "OpenDRIVE"),
+    ".xml": ("a CommonRoad file", "commonRoad"),
 }
-"""By the suffix of a file's name."""
+"""The name of a file with its article, and its root element, by the suffix of its name."""
 PART_KINDS = ("lanelet", "junction", "box")
 _MARGIN_M = 40.0  # around requested lanes
 _TRIED_PLACES_COUNT = 6  # around which a part is drawn
@@ -81,12 +67,12 @@ def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
     from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 
     suffix = path.suffix.lower()
-    map_format = FORMATS[suffix]
+    name, root_tag = FORMATS[suffix]
     lanes_of = {".osm": lanelet2, ".xodr": opendrive, ".xml": commonroad}[suffix].lanes_of
     with reading(path):
         root = read_xml(path, f"map {path}")
-        if root.tag != map_format.root:
-            raise InputError(f"{root.place}: the root of {map_format.name} is <{map_format.root}>")
+        if root.tag != root_tag:
+            raise InputError(f"{root.place}: the root of {name} is <{root_tag}>")
         return network_of(path.stem, lanes_of(root))
 
 

@@ -261,11 +261,14 @@ def _lanes_of_side(
     normal = unit_left(stations.poses[:, 2])
     offset = stations.centre
     inner = stations.poses[:, :2] + offset[:, None] * normal
-    elements.sort(key=lambda lane: sign * _lane_id(lane, sign))
+    elements.sort(key=lambda lane: sign * lane.number("id"))
     for count, lane in enumerate(elements, start=1):
-        name = _lane_id(lane, sign)
+        name = int(lane.number("id"))
         if name != sign * count:
-            reason = f"{lane.place}: a second lane {name}, or one nearer to the centre is missing"
+            reason = (
+                f"{lane.place}: lane {name} is a second one, on the wrong side, or beyond a "
+                "missing one"
+            )
             faults.add("lane", f"{road.id}.{number}.{name} and those beyond it", reason)
             return
         widths, borders = lane.findall("width"), lane.findall("border")
@@ -281,16 +284,3 @@ def _lanes_of_side(
             faults.add("lane", drawn.name, f"{lane.place}: it has neither width nor border")
         yield name, drawn
         inner = outer
-
-
-def _lane_id(lane: Element, sign: int) -> int:
-    """Return the id of a lane on the side with a sign."""
-    text = lane.attribute("id")
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number * sign <= 0:
-        side = "above" if sign > 0 else "below"
-        raise InputError(f"{lane.place}: id {text[:20]!r}; whole numbers {side} 0 are needed here")
-    return number

@@ -115,7 +115,7 @@ def test_record_at_section_end_begins_next(tmp_path, kind):
     network = read(tmp_path, road("".join(sections), offsets=offset))
     assert all(np.allclose(lane.centre[:, 1], -1.75) for lane in network.lanes)
     assert [len(names) for names in after(network).values()] == [1] * (len(sections) - 1) + [0]
-    assert NoteKind.LINKS_LEFT_OUT not in {note.kind for note in network.notes}
+    assert NoteKind.FAULTY not in {note.kind for note in network.notes}
 
 
 def test_one_sided_section_spares_other_side(tmp_path):

@@ -186,8 +186,7 @@ def test_odd_element_is_omitted_and_named(tmp_path, suffix, old, new):
     count = 2 if old == "leftBound" else 1  # both tags of it
     rest = read_network(write(tmp_path, suffix, text.replace(old, new, count)))
     faults = [
-        [note for note in each.notes if note.kind in (NoteKind.FAULTY, NoteKind.LINKS_LEFT_OUT)]
-        for each in (whole, rest)
+        [note for note in each.notes if note.kind is NoteKind.FAULTY] for each in (whole, rest)
     ]
     assert len(faults[1]) > len(faults[0])
     assert 0.5 * len(whole.lanes) <= len(rest.lanes) <= len(whole.lanes)
