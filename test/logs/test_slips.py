@@ -177,7 +177,7 @@ def test_table_is_read_as_driven(tmp_path, change, columns, said, options):
 def test_velocities_ahead_are_of_bodies(tmp_path, aside_share, is_noted):
     """Velocities with vy = 0 nearly always; in the frame of the map they contradict the one that drives north."""
     rows = crossing()
-    turned = np.arange(len(rows)) % 20 < 20 * aside_share
+    turned = rows.groupby("vehicle_id").cumcount() % 20 < 20 * aside_share
     velocity = {"vx_mps": rows.speed_mps * ~turned, "vy_mps": rows.speed_mps * turned}
     rows = rows.drop(columns="speed_mps").assign(**velocity)
     notes = " ".join(read_log(save(rows, tmp_path), LogConfig(strict=False)).quality.notes)

@@ -69,6 +69,21 @@ def test_wall_beside_way_ends_it(left, blocked):
     assert not blocked or ends[1][1] == pytest.approx(3.0, abs=1.01)
 
 
+@pytest.mark.parametrize(("left", "metres"), [(1.3, 3.2), (-1.3, 3.2), (2.0, 12.0), (-2.0, 12.0)])
+def test_sides_are_square_to_way(left, metres):
+    """The same on a way at 45°: a pillar of 0.7 m, 6 m ahead of the last centre."""
+    ahead = np.sqrt(0.5) * np.ones(2)
+    centre = 10.0 + np.arange(20.0)[:, None] * ahead
+    node = np.column_stack((centre, np.full(20, 0.25 * np.pi)))
+    pillar = centre[-1] + 6.0 * ahead + left * np.array([-ahead[1], ahead[0]])
+    column, row = (pillar / 0.1).astype(int)
+    drivable = np.ones((500, 500), dtype=bool)
+    drivable[row - 3 : row + 4, column - 3 : column + 4] = False
+    path = BasePath(node, 1.0, np.zeros(0))
+    found = road_ahead(path, CAR, road_of(drivable, 0.1), np.full(2, 12.0))
+    assert found[1] == pytest.approx(metres, abs=1.01)
+
+
 def test_deviations_are_bent_within_room():
     """Unchanged up to 0.6 of the room, then bent with the same slope, never beyond."""
     room = np.full(2001, 2.0)
