@@ -23,12 +23,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from scenario_gen.bags.recordings.read import (
+    ego_of,
     INFO,
     Namespace,
     read_recording,
     ScenarioEntry,
     SCENARIOS,
-    WITNESS,
 )
 from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
@@ -50,7 +50,6 @@ from scenario_gen.types import (
     join_ego,
     Road,
     Scenario,
-    token,
 )
 
 MakePlanner = Callable[[], Planner]
@@ -156,8 +155,7 @@ def trial_of(
         InputError: there is no such vehicle, the scenario was made for another ego, or the
             reference drive is missing.
     """
-    slot = entry.ego.id if entry and entry.ego else ""
-    return Trial(name, join_ego(scenario), _ego_of(scenario, slot, ego, place), road)
+    return Trial(name, join_ego(scenario), ego_of(scenario, entry, ego, place), road)
 
 
 def trials_of(result: GenerationResult, ego: str | int = "") -> list[Trial]:
@@ -201,41 +199,6 @@ def _encounter_of(entry: ScenarioEntry | None) -> str:
     if entry.facts.decision is not None:
         return name
     return f"{name} {digest[:8]}".strip()
-
-
-def named_vehicle(ids: Sequence[str], name: str) -> str:
-    """Return the first id that equals a name or has it as its token; "" if there is none."""
-    return next((id_ for id_ in ids if name in (id_, token(id_))), "")
-
-
-def _ego_of(scenario: Scenario, slot: str, asked: str, place: str) -> str:
-    """Return the id of the vehicle that the ego replaces.
-
-    Raises:
-        InputError: there is no such vehicle, the scenario was made for another ego, or the
-            reference drive is missing.
-    """
-    if scenario.reference_drive is not None:
-        ego = scenario.reference_drive.vehicles[0].id
-        if asked and not named_vehicle([ego], asked):
-            raise InputError(
-                f"{place}: it was made for ego {ego!r}; leave --ego out, or use --ego {ego}"
-            )
-        return ego
-    ids = [vehicle.id for vehicle in scenario.vehicles]
-    if slot and asked in ("", slot):
-        raise InputError(
-            f"{place}: it was made for ego {slot!r}, whose reference drive is not in the bag "
-            f"(recorded before 0.6, or without `{WITNESS}`): generate it again, or name another "
-            f"vehicle with --ego; it has {', '.join(ids)}"
-        )
-    ego = named_vehicle(ids, asked or ids[0])
-    if not ego:
-        raise InputError(
-            f"{place}: no vehicle {asked!r} to be the ego; "
-            f"it has {', '.join(ids)}{did_you_mean(asked, ids)}"
-        )
-    return ego
 
 
 def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[Outcome]:

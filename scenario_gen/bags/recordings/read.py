@@ -30,7 +30,7 @@ from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
 from scenario_gen.bags.storage.bag import naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.messages import BagMessage
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.types import (
     Decided,
     Encounter,
@@ -38,7 +38,9 @@ from scenario_gen.types import (
     GenerationResult,
     Road,
     Route,
+    Scenario,
     Segmentation,
+    token,
 )
 
 __all__ = [
@@ -50,7 +52,9 @@ __all__ = [
     "Recording",
     "RequestSummary",
     "ScenarioEntry",
+    "ego_of",
     "load",
+    "named_vehicle",
     "read_recording",
 ]
 
@@ -398,3 +402,45 @@ def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
             seed,
             provenance=recording.provenance,
         )
+
+
+def named_vehicle(ids: Sequence[str], name: str) -> str:
+    """Return the first id that equals a name or has it as its token; "" if there is none."""
+    return next((id_ for id_ in ids if name in (id_, token(id_))), "")
+
+
+def ego_of(scenario: Scenario, entry: ScenarioEntry | None, asked: str, place: str) -> str:
+    """Return the id of the vehicle that an ego replaces.
+
+    Args:
+        scenario: the scenario, with its reference drive if it has one.
+        entry: its entry on `scenarios/info`, if known.
+        asked: id or token of the vehicle; "": that of the ego slot, or the first.
+        place: place of the scenario, for messages.
+
+    Raises:
+        InputError: there is no such vehicle, the scenario was made for another ego, or the
+            reference drive is missing.
+    """
+    if scenario.reference_drive is not None:
+        ego = scenario.reference_drive.vehicles[0].id
+        if asked and not named_vehicle([ego], asked):
+            raise InputError(
+                f"{place}: it was made for ego {ego!r}; leave --ego out, or use --ego {ego}"
+            )
+        return ego
+    ids = scenario.ids
+    slot = entry.ego.id if entry and entry.ego else ""
+    if slot and asked in ("", slot):
+        raise InputError(
+            f"{place}: it was made for ego {slot!r}, whose reference drive is not in the bag "
+            f"(recorded before 0.6, or without `{WITNESS}`): generate it again, or name another "
+            f"vehicle with --ego; it has {', '.join(ids)}"
+        )
+    ego = named_vehicle(ids, asked or ids[0])
+    if not ego:
+        raise InputError(
+            f"{place}: no vehicle {asked!r} to be the ego; "
+            f"it has {', '.join(ids)}{did_you_mean(asked, ids)}"
+        )
+    return ego

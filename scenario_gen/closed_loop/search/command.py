@@ -15,6 +15,7 @@ from typing import Any
 
 from scipy import special
 
+from scenario_gen.bags.recordings.read import named_vehicle
 from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
@@ -30,7 +31,7 @@ from scenario_gen.closed_loop.search.journal import open_journal
 from scenario_gen.closed_loop.search.objective import AT_FAULT, COLLISION, Objective
 from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.search.settings import SETTINGS
-from scenario_gen.closed_loop.trials import find_planner, named_vehicle, Rate, trial_runner
+from scenario_gen.closed_loop.trials import find_planner, Rate, trial_runner
 from scenario_gen.method.evaluation import measures_in, wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Limits

@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.bags.recordings.read import (
+    ego_of,
     INFO,
     Namespace,
     read_recording,
     ScenarioEntry,
     SCENARIOS,
-    WITNESS,
 )
 from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.types import join_ego, Road, Scenario, split_off, tokens
+from scenario_gen.types import join_ego, Road, Scenario, split_off
 
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
 
@@ -192,35 +192,17 @@ def _with_ego(
     """Return the vehicles around the ego, and its track.
 
     Raises:
-        InputError: the requested ego is not a vehicle of the scenario or its only one, another ego
-            was left out, or the ego's track is not in the bag.
+        InputError: as `ego_of`, or the requested ego is the only vehicle.
     """
-    slot = entry.ego.id if entry and entry.ego else ""
-    ids = list(tokens(scenario.ids))
-    where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
-    if slot:
-        if requested not in ("", slot):
-            raise InputError(
-                f"{where} was generated for ego {slot!r}; omit --ego, or name that vehicle"
-            )
-        track = scenario.reference_drive
-        if track is None or tokens(track.ids) != (slot,):
-            raise InputError(
-                f"{where} was generated for ego {slot!r}, whose track is missing on "
-                f"{space.where(WITNESS)}"
-            )
-        return replace(scenario, reference_drive=None), track
-    if not requested:
+    if scenario.reference_drive is None and not (requested or (entry and entry.ego)):
         return scenario, None
-    if requested not in ids:
-        raise InputError(
-            f"{where} has no vehicle {requested!r} for --ego; it has: {', '.join(ids)}"
-        )
-    if len(ids) == 1:
-        raise InputError(
-            f"{where} has only vehicle {requested!r}, so there would be none around the ego"
-        )
-    return split_off(scenario, ids.index(requested))
+    where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
+    ego = ego_of(scenario, entry, requested, where)
+    if scenario.reference_drive is not None:
+        return replace(scenario, reference_drive=None), scenario.reference_drive
+    if len(scenario.ids) == 1:
+        raise InputError(f"{where} has only vehicle {ego!r}, so there would be none around it")
+    return split_off(scenario, scenario.ids.index(ego))
 
 
 def _case(

@@ -93,7 +93,7 @@ def test_chosen_scenario_with_ego_is_exported(small_bag, tmp_path):
         ),
         (
             ["--to", "commonroad", "--ego", "9"],
-            "has no vehicle '9' for --ego; it has: 1, 2",
+            "no vehicle '9' to be the ego; it has 1, 2",
         ),
         (["--to", "osi"], "--to osi was removed: export openscenario"),
         (["--to", "commonroad", "--index", "77"], "no scenario 77; it has "),
