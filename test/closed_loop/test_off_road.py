@@ -3,13 +3,14 @@
 
 """Depth and room of a footprint against every pair of a point and a cell."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from scenario_gen.closed_loop.off_road import _depth, MAX_DEPTH_M, road_use
-from scenario_gen.types import Motion, Vehicle
+from scenario_gen.closed_loop.off_road import _depth, is_off_road, MAX_DEPTH_M, road_use
+from scenario_gen.types import LaneNetwork, Motion, Obstacle, Vehicle
 from scenario_gen.types.road import Road
 
 HALF = (2.0, 0.9)
@@ -79,3 +80,21 @@ def test_post_under_car_has_centre_depth():
     drivable[20:24, 20:24] = False  # 0.8 m wide
     depth = _depth(road_of(drivable, 0.2), np.array([[4.7, 4.3, 0.4]]), HALF)
     assert depth == pytest.approx(0.4, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "off"),
+    [
+        (10.0, 10.0, False),
+        (4.0, 10.0, True),  # in the obstacle
+        (10.0, 18.95, False),  # nearer to the edge than its diagonal
+        (10.0, 19.25, True),  # its centre is on the road
+        (10.0, 25.0, True),  # the grid has no cell there
+        (-5.0, 10.0, True),
+    ],
+)
+def test_one_pose_off_the_road(x, y, off):
+    parked = Obstacle(4.5, 10.0, 0.0, 1.0, 2.0)
+    network = LaneNetwork("", (), obstacles=(parked,))
+    road = replace(road_of(np.ones((40, 40), dtype=np.bool_), 0.5), lanes=network)
+    assert is_off_road(road, np.array([x, y, 0.0]), HALF, 0.1) == off

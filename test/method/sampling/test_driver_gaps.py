@@ -85,6 +85,16 @@ def test_untruncated_sigma_is_what_is_drawn(sigma):
     assert ramp.gap_of(gap, [], config, limits).delay(z).std() == pytest.approx(sigma, rel=0.05)
 
 
+def test_yielder_without_approach_has_gap():
+    """It is in the conflict area when the scenario begins."""
+    ramp = Ramp(np.linspace(0.0, 10.0, 11), np.ones(11), np.zeros(11))
+    (edge,) = Situation.of(CROSSING).reactions.edges
+    edge = replace(edge, stands=False, since=0.0, until=0.0, lag=0.0, gap=0.0)
+    gap = ramp.gap_of(edge, [], SamplingConfig(gap_sigma=0.5), PipelineConfig().limits)
+    assert gap.basis.tolist() == [1.0] * 11 and gap.rate.tolist() == [0.0] * 11
+    assert np.isfinite(gap.delay(np.linspace(-3.0, 3.0, 7))).all()
+
+
 def test_one_driver_keeps_one_headway():
     (edge,) = Situation.of(LANE).reactions.edges
     planned = chain(LANE, drivers=0.0)
