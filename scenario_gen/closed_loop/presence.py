@@ -137,8 +137,8 @@ def _stopping_way(speed: float, target: float) -> float:
 def is_in_way(world: World, i: int, vehicles: Floats) -> bool:
     """Return whether vehicle i, which would leave, is in the way of the ego.
 
-    It is near, ahead in the same direction or moving away from the ego. One that touches another
-    vehicle leaves.
+    It is near, ahead or beside in the same direction, or moving away from the ego. One that
+    touches another vehicle leaves.
 
     Args:
         world: the scenario.
@@ -148,19 +148,22 @@ def is_in_way(world: World, i: int, vehicles: Floats) -> bool:
     ego = vehicles[world.ego]
     dx = vehicles[i, 0] - ego[0]
     dy = vehicles[i, 1] - ego[1]
-    gap = np.hypot(dx, dy) - world.half[i, 0] - world.half[world.ego, 0]
+    half = world.half[i]
+    ego_half = world.half[world.ego]
+    sizes = np.hypot(half[0], half[1]) + np.hypot(ego_half[0], ego_half[1])
+    gap = np.hypot(dx, dy) - sizes  # at most that of the footprints
     if gap > max(_stopping_way(ego[3], 0.0), IN_WAY_M):
         return False
     cos = np.cos(vehicles[i, 2])
     sin = np.sin(vehicles[i, 2])
     same_direction = np.cos(ego[2] - vehicles[i, 2]) >= MODEL.same_direction_ratio
-    is_ahead = dx * np.cos(ego[2]) + dy * np.sin(ego[2]) > 0.0
-    if not ((same_direction and is_ahead) or dx * cos + dy * sin > 0.0):
+    is_behind = dx * np.cos(ego[2]) + dy * np.sin(ego[2]) < -sizes
+    if not ((same_direction and not is_behind) or dx * cos + dy * sin > 0.0):
         return False
     box = np.empty(7)
     other = np.empty(7)
     pose = vehicles[i]
-    fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], box)
+    fill_box(pose[0], pose[1], pose[2], half[0], half[1], box)
     for j in range(vehicles.shape[0]):
         if j in (i, world.ego) or vehicles[j, 4] == 0.0:
             continue
