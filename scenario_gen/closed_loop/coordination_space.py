@@ -90,9 +90,13 @@ class World(NamedTuple):
 WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I, F3, F2, F2, B1, F2, F3)
 
 
-def _ego_index(scenario: Scenario, ego: int | str) -> int:
-    """Return the index of the vehicle that the ego replaces, from its index or id."""
-    ids = [vehicle.id for vehicle in scenario.vehicles]
+def ego_index(scenario: Scenario, ego: int | str) -> int:
+    """Return the index of the vehicle that the ego replaces, from its index or id.
+
+    Raises:
+        InputError: the scenario has no such vehicle.
+    """
+    ids = scenario.ids
     if isinstance(ego, int):
         if 0 <= ego < len(ids):
             return ego
@@ -118,7 +122,7 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
     Raises:
         InputError: it has no such vehicle, or does not start at 0 s.
     """
-    ego = _ego_index(scenario, ego)
+    ego = ego_index(scenario, ego)
     time = scenario.time
     if len(time) < 2 or time[0] != 0.0:
         raise InputError(

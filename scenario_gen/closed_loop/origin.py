@@ -9,6 +9,7 @@ import hashlib
 
 import numpy as np
 
+from scenario_gen.closed_loop.coordination_space import ego_index
 from scenario_gen.numerics import ahead_and_left, Floats, Ints
 from scenario_gen.types import Road, Scenario
 
@@ -58,10 +59,9 @@ def origins_of(trials: Sequence[Trial]) -> list[Origin]:
     known: dict[tuple[str, int, int], list[tuple[str, Floats]]] = {}
     result = []
     for trial in trials:
-        ids = [vehicle.id for vehicle in trial.scenario.vehicles]
-        number = ids.index(trial.ego) if isinstance(trial.ego, str) else trial.ego
+        number = ego_index(trial.scenario, trial.ego)
         shape = _shape(trial.scenario, number)
-        group = known.setdefault((trial.encounter, len(ids), number), [])
+        group = known.setdefault((trial.encounter, len(trial.scenario.vehicles), number), [])
         copies = (name for name, other in group if np.abs(other - shape).max() <= COPY_TOLERANCE_M)
         original = next(copies, "")
         if not original:

@@ -20,6 +20,7 @@ from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.base.documents import read_text
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import write_text
+from scenario_gen.closed_loop.coordination_space import ego_index
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.results import as_junit, drawings, Drives, JUNIT
 from scenario_gen.closed_loop.trials import passed_of, Rate, read_trials
@@ -130,11 +131,10 @@ def write_selection(folder: Path, bags: Sequence[Path], names: Collection[str]) 
 def category_of(trial: Trial) -> Category:
     """Return the category of a scenario by the vehicle that comes nearest to the ego in it."""
     scenario = trial.scenario
-    ids = [vehicle.id for vehicle in scenario.vehicles]
-    ego = ids.index(trial.ego) if isinstance(trial.ego, str) else trial.ego
+    ego = ego_index(scenario, trial.ego)
     present = mask(scenario.present, len(scenario.time))
     nearest, least = ego, np.inf
-    for other in range(len(ids)):
+    for other in range(len(scenario.vehicles)):
         both = present[ego] & present[other]
         gap = footprint_distance(scenario, ego, other)[both].min(initial=np.inf)
         if other != ego and gap < least:
