@@ -20,7 +20,7 @@ from scenario_gen.closed_loop.driver import (
     RATE,
 )
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import Box, box_gap, boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
 
 IN_WAY_M = 25.0  # a vehicle that leaves is farther away than this
@@ -150,14 +150,18 @@ def is_in_way(world: World, i: int, vehicles: Floats) -> bool:
     dy = vehicles[i, 1] - ego[1]
     half = world.half[i]
     ego_half = world.half[world.ego]
-    sizes = np.hypot(half[0], half[1]) + np.hypot(ego_half[0], ego_half[1])
-    gap = np.hypot(dx, dy) - sizes  # at most that of the footprints
-    if gap > max(_stopping_way(ego[3], 0.0), IN_WAY_M):
-        return False
     cos = np.cos(vehicles[i, 2])
     sin = np.sin(vehicles[i, 2])
-    same_direction = np.cos(ego[2] - vehicles[i, 2]) >= MODEL.same_direction_ratio
-    is_behind = dx * np.cos(ego[2]) + dy * np.sin(ego[2]) < -sizes
+    ego_cos = np.cos(ego[2])
+    ego_sin = np.sin(ego[2])
+    gap = box_gap(
+        Box(vehicles[i, 0], vehicles[i, 1], cos, sin, half[0], half[1]),
+        Box(ego[0], ego[1], ego_cos, ego_sin, ego_half[0], ego_half[1]),
+    )
+    if gap > max(_stopping_way(ego[3], 0.0), IN_WAY_M):
+        return False
+    same_direction = cos * ego_cos + sin * ego_sin >= MODEL.same_direction_ratio
+    is_behind = dx * ego_cos + dy * ego_sin < -half[0] - ego_half[0]
     if not ((same_direction and not is_behind) or dx * cos + dy * sin > 0.0):
         return False
     box = np.empty(7)
