@@ -77,10 +77,6 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
         "scenario_gen/situation/traffic_side.py",
         "position=(encounter.position / flip),",
     ): "the factors are 1 and -1, which are their own inverses",
-    (
-        "scenario_gen/method/evaluation/dtw.py",
-        "for rows in blocks(n, (a.shape[0] / m)):",
-    ): "the size of a block bounds memory and changes no distance",
     ("scenario_gen/method/fitting/state_check.py", "_ROUNDING_M = (0.018000000000000002)"): (
         "rounding takes 7 mm at most; any more keeps the room"
     ),

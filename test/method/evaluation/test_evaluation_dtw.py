@@ -62,10 +62,12 @@ def test_headings_differ_by_the_wrapped_angle(a, b):
         )
 
 
-def test_batched_rows_are_the_matrices():
+@pytest.mark.parametrize("n_samples", [5, 70])
+def test_batched_rows_are_the_matrices(n_samples):
+    """With fewer and with more samples than instants."""
     rng = np.random.default_rng(3)
-    a, b = rng.normal(size=(5, 2, 20)), rng.normal(size=(5, 2, 30))
+    a, b = (rng.normal(size=(n_samples, 2, count)) for count in (20, 30))
     single = np.stack([feature_matrix(x.T, y.T) for x, y in zip(a, b, strict=True)])
     rows = feature_rows(a, b, feature_extents(a, b), range(3, 7))
-    np.testing.assert_array_equal(rows.reshape(5, 4, 30), single[:, 3:7])
+    np.testing.assert_array_equal(rows.reshape(n_samples, 4, 30), single[:, 3:7])
     np.testing.assert_allclose(mean_feature(a, b), single.mean(axis=0), atol=1e-15)
