@@ -46,15 +46,6 @@ def test_reference_has_defaults_and_ranges():
     assert rows[0] == rows[1], "run: python docs/tables.py"
 
 
-def test_flatten_gives_dotted_names():
-    assert {name: value for name, (_, value) in flatten(Outer()).items()} == {
-        "inner.gain": 0.5,
-        "inner.mode": "a",
-        "count": 3,
-        "on": True,
-    }
-
-
 def test_updated_sets_nested_values():
     config = updated(Outer(), {"inner.gain": 1, "on": False})
     assert config.inner.gain == 1.0 and isinstance(config.inner.gain, float)

@@ -5,14 +5,12 @@
 
 from dataclasses import replace
 
-import pytest
 from support.bag_examples import hand_made_run
 from support.message_examples import encounter
 
-from msg_conventions.documents import hash_of, head_of, LANES, PLAN
-from msg_conventions.roads import encode_description, encode_map
+from msg_conventions.documents import hash_of
+from msg_conventions.roads import encode_map
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.base.errors import InputError
 
 
 def test_same_geometry_changes_template_hash_only():
@@ -30,16 +28,3 @@ def test_same_geometry_changes_template_hash_only():
     cells[0, 0] = False
     assert hash_of("map", encode_map(replace(road, drivable=cells), 5)) != one["map"]
     assert hash_of("map", first["map"] + b"\x00") == one["map"]
-
-
-def test_document_names_its_inputs():
-    run = hand_made_run()
-    grid = encode_map(run.road, 5)
-    road = encode_description(run.road, grid, 5)
-    assert (head_of(road, LANES).stamp, head_of(road, LANES).inputs) == (
-        5,
-        {"map": hash_of("map", grid)},
-    )
-    assert hash_of(LANES, road) == hash_of(LANES, road + bytes(3))  # as DDS fills it up
-    with pytest.raises(InputError, match="fit/info"):
-        head_of(grid, PLAN)

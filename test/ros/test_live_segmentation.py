@@ -11,6 +11,7 @@ from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.logs import read_log
+from scenario_gen.logs.geodesy import local_frame
 
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"
@@ -31,6 +32,20 @@ def suite(tmp_path_factory, domain):
     made = Processes(tmp_path_factory.mktemp("live"), domain, NODES)
     yield made
     assert made.end() == dict.fromkeys(NODES, 0)
+
+
+def assert_streamed(encounter, vehicle, messages):
+    """Every sample of a vehicle was sent, where and when it was."""
+    from rclpy.serialization import deserialize_message
+    from sensor_msgs.msg import NavSatFix
+
+    fixes = [deserialize_message(data, NavSatFix) for data in messages]
+    stamps = np.array([fix.header.stamp.sec * 10**9 + fix.header.stamp.nanosec for fix in fixes])
+    index, rest = np.divmod(stamps - encounter.start_ns, encounter.dt_ns)
+    assert not rest.any() and (np.diff(index) == 1).all()
+    degrees = np.array([(fix.latitude, fix.longitude) for fix in fixes])
+    places = local_frame(*degrees.T, encounter.origin)
+    assert np.abs(places - encounter.position[vehicle, index]).max() < 1e-3
 
 
 def test_streams_become_scenarios(suite, client):
@@ -54,6 +69,8 @@ def test_streams_become_scenarios(suite, client):
         encounter.start_ns,
         pytest.approx(encounter.duration, abs=0.2),
     )
+    for index, heard in enumerate(("/vehicle_1/fix", "/vehicle_2/fix")):
+        assert_streamed(encounter, index, client.wait(heard, len(encounter.time) - 2))
     moved = template.position - encounter.position[:, : len(template.time)]
     assert np.ptp(moved, axis=(0, 1)).max() < 0.2  # smoothed once more, about another origin
     points = decode_changepoints(client.wait("/changepoints")[0], template).changepoints * 0.1

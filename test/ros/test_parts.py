@@ -3,11 +3,13 @@
 
 """The parts of the nodes that need no other process."""
 
+import math
 from pathlib import Path
 import threading
 
+from nav_msgs.srv import GetPlan
+import numpy as np
 import pytest
-from rclpy.parameter import Parameter
 
 from msg_conventions.cdr import encode
 from msg_conventions.documents import encode_document, hash_of, Head
@@ -16,9 +18,11 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.worker import Worker
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.ros.common.ros_parameters import descriptor, with_values
+from scenario_gen.roads import build_road
+from scenario_gen.ros.common.ros_parameters import descriptor
 from scenario_gen.ros.common.stage_node import Inputs
 from scenario_gen.ros.common.suite import Job, parameters
+from scenario_gen.ros.nodes import planner
 from scenario_gen.ros.nodes.road_server import road_of_url
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -105,13 +109,6 @@ def test_parameters_have_descriptors_with_ranges():
             assert entry.metadata["choices"][0] in made.additional_constraints
 
 
-def test_values_are_checked():
-    config = PipelineConfig()
-    assert with_values(config, [Parameter("road.lane_width", value=4)]).road.lane_width == 4.0
-    with pytest.raises(InputError, match=r"lane_width.*at least"):
-        with_values(config, [Parameter("road.lane_width", value=-4.0)])
-
-
 def test_urls_of_load_map():
     assert road_of_url("file:///maps/a%20b.yaml") == "/maps/a b.yaml"
     assert road_of_url("straight") == "straight"
@@ -130,3 +127,35 @@ def test_suite_passes_on_all_parameters(tmp_path):
     assert {name for name in flatten(PipelineConfig()) if name.split(".")[0] in stages} <= given
     assert body["/x/gp_sampler"]["ros__parameters"]["count"] == 5
     assert body["/x/log_player"]["ros__parameters"]["encounter"] == 3
+
+
+def _plan_request(**changes: float | str) -> GetPlan.Request:
+    """Along the built-in straight road, with fields of the goal and the tolerance changed."""
+    request = GetPlan.Request()
+    request.start.pose.position.x, request.goal.pose.position.x = 10.0, 100.0
+    request.start.pose.position.y = request.goal.pose.position.y = 3.75
+    request.tolerance = changes.get("tolerance", 0.0)
+    request.goal.header.frame_id = changes.get("frame", "map")
+    request.goal.pose.position.x = changes.get("x", 100.0)
+    request.goal.pose.orientation.w = changes.get("w", 1.0)
+    return request
+
+
+def test_plan_joins_the_requested_poses():
+    query = planner.query_of(_plan_request(), "map", planner.Config())
+    path = planner.plan_poses(build_road("straight"), query, planner.Config())
+    assert np.allclose(path[[0, -1]], [[10.0, 3.75, 0.0], [100.0, 3.75, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "named"),
+    [
+        ("tolerance", -1.0, "tolerance"),
+        ("frame", "elsewhere", "goal .*elsewhere"),
+        ("x", math.nan, "goal is not finite"),
+        ("w", 0.0, "goal: quaternion"),
+    ],
+)
+def test_impossible_plan_requests_are_refused(field, value, named):
+    with pytest.raises(InputError, match=named):
+        planner.query_of(_plan_request(**{field: value}), "map", planner.Config())

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import canonical_angle, canonical_heading
+from scenario_gen.numerics.arrays import canonical_heading
 from scenario_gen.types import Encounter, Vehicle
 
 
@@ -45,16 +45,6 @@ def test_arrays_cannot_be_changed():
 def test_bad_encounters_are_refused(changes, said):
     with pytest.raises(InputError, match=said):
         encounter(**changes)
-
-
-@given(st.floats(-50.0, 50.0))
-@example(np.pi)
-@example(-np.pi)
-@example(3.1415926535)
-def test_canonical_angle_survives_a_quaternion(angle):
-    canonical = canonical_angle(angle)
-    z, w = np.sin(canonical / 2), np.cos(canonical / 2)
-    assert canonical_angle(2.0 * np.arctan2(z, w)) == canonical
 
 
 @given(st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=50), st.floats(-10.0, 10.0))
