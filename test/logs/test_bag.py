@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 
 from mcap.writer import Writer as McapWriter
 import numpy as np
-import pandas as pd
 import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from support.log_builders import crossing, geographic, save
 from support.recording_files import tracked
-from support.synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
@@ -39,7 +37,22 @@ class Line:
 
 
 def header(stamp, frame="map"):
-    return STORES.types["std_msgs/msg/Header"](stamp=nanoseconds_to_time(stamp), frame_id=frame)
+    time = STORES.types["builtin_interfaces/msg/Time"](*divmod(stamp, 10**9))
+    return STORES.types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
+
+
+def fix_of(head, latitude, longitude):
+    """A NavSatFix at a height of 500 m."""
+    types = STORES.types
+    status = types["sensor_msgs/msg/NavSatStatus"](status=0, service=1)
+    fix = types[FIX](head, status, latitude, longitude, 500.0, np.zeros(9), 0)
+    return bytes(STORES.serialize_cdr(fix, FIX))
+
+
+def twist_of(speed):
+    """A Twist along the vehicle's x axis."""
+    vector = STORES.types["geometry_msgs/msg/Vector3"]
+    return STORES.types["geometry_msgs/msg/Twist"](vector(speed, 0.0, 0.0), vector(0.0, 0.0, 0.0))
 
 
 def streams(rows, stamped=True, prefix=""):
@@ -49,10 +62,10 @@ def streams(rows, stamped=True, prefix=""):
         stamp = round(row.t_s * 1e9)
         head = header(stamp if stamped else 0)
         space = f"{prefix}/vehicle_{row.vehicle_id}"
-        fix = STORES.serialize_cdr(fix_message(head, row.lat_deg, row.lon_deg), FIX)
-        speed = STORES.serialize_cdr(twist_message(head, row.speed_mps), TWIST)
+        fix = fix_of(head, row.lat_deg, row.lon_deg)
+        speed = STORES.serialize_cdr(STORES.types[TWIST](head, twist_of(row.speed_mps)), TWIST)
         lines += [
-            Line(f"{space}/fix", FIX, stamp + 20_000_000, bytes(fix)),
+            Line(f"{space}/fix", FIX, stamp + 20_000_000, fix),
             Line(f"{space}/speed", TWIST, stamp, bytes(speed)),
         ]
     return lines
@@ -61,7 +74,6 @@ def streams(rows, stamped=True, prefix=""):
 def odometry(rows, topic="/{}/odom", frame="map", child="base_link", late=0.0):
     """nav_msgs/Odometry per vehicle, received `late` seconds after its stamp."""
     types = STORES.types
-    vector, zero = types["geometry_msgs/msg/Vector3"], {"x": 0.0, "y": 0.0, "z": 0.0}
     lines = []
     for row in rows.itertuples():
         yaw = getattr(row, "yaw", 0.0 if row.vehicle_id == "a" else np.pi / 2.0)
@@ -71,9 +83,7 @@ def odometry(rows, topic="/{}/odom", frame="map", child="base_link", late=0.0):
         pose = types["geometry_msgs/msg/Pose"](
             types["geometry_msgs/msg/Point"](row.x_m, row.y_m, 0.0), turn
         )
-        twist = types["geometry_msgs/msg/Twist"](
-            vector(**zero | {"x": row.speed_mps}), vector(**zero)
-        )
+        twist = twist_of(row.speed_mps)
         message = types[ODOMETRY](
             header=header(round(row.t_s * 1e9), frame.format(row.vehicle_id)),
             child_frame_id=child.format(row.vehicle_id),
@@ -244,19 +254,6 @@ def test_a_fix_without_fix_is_dropped(tmp_path):
     assert drop.first.endswith("topic /vehicle_a/fix, message 11")
 
 
-@pytest.mark.parametrize(
-    ("frame", "said"),
-    [
-        ("{}/odom", r"nothing ties .*a in 'a/odom', b in 'b/odom'.*one frame|such as map"),
-        ("odom", "counts from where its vehicle started"),
-        ("a/base_link", "moves with its vehicle"),
-    ],
-)
-def test_frames_that_nothing_ties_stop(tmp_path, frame, said):
-    with pytest.raises(InputError, match=said):
-        read_log(write(tmp_path / "drive", odometry(crossing(), frame=frame)))
-
-
 def of(rows, name):
     return rows[rows.vehicle_id == name]
 
@@ -415,19 +412,15 @@ def test_differing_header_clocks_are_a_doubt(tmp_path):
     np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
 
 
-@pytest.mark.parametrize(
-    ("ahead_s", "rate", "said"),
-    [(0.4, 1.0, "clocks differ by 0.4 s"), (0.0, 1.03, "runs 1.03 times as fast")],
-)
-def test_small_difference_of_clocks_is_reported(tmp_path, ahead_s, rate, said):
+def test_faster_header_clock_is_reported(tmp_path):
     rows = crossing()
     other = of(rows, "b")
-    late = pd.Series((other.t_s - 1000.0) * (1.0 / rate - 1.0) - ahead_s)
+    late = (other.t_s - 1000.0) * (1.0 / 1.03 - 1.0)
     lines = odometry(of(rows, "a"))
     for line, by in zip(odometry(other), late, strict=True):
         lines.append(replace(line, stamp=line.stamp + round(by * 1e9)))
     bag = write(tmp_path / "bag", sorted(lines, key=lambda line: line.stamp))
-    assert said in " ".join(map(str, read_log(bag).doubts))
+    assert "runs 1.03 times as fast" in " ".join(map(str, read_log(bag).doubts))
 
 
 def test_clocks_of_objects_and_ego_compared(tmp_path):
@@ -466,13 +459,6 @@ def test_stamps_in_milliseconds_stop(tmp_path):
     assert read_log(bag, stamps="received").encounters[0].speed.max() < 8.5
 
 
-def test_two_odometries_are_one_vehicle(tmp_path):
-    rows = of(crossing(), "a")
-    lines = [*odometry(rows, "/odom"), *odometry(rows, "/odometry/filtered")]
-    with pytest.raises(InputError, match="both are read as one vehicle"):
-        read_log(write(tmp_path / "bag", lines))
-
-
 def test_recorded_tracks_are_read_bit_exactly(tmp_path, plain):
     data = encode_tracks(plain)
     lines = [
@@ -498,13 +484,8 @@ def test_recorded_tracks_are_read_bit_exactly(tmp_path, plain):
         LogConfig(topics="/vehicle_a/fix,/vehicle_a/speed,/vehicle_b/fix,/vehicle_b/speed"),
     )
     np.testing.assert_allclose(chosen.encounters[0].position, plain.position, atol=1e-3)
-    for config, words in (
-        (LogConfig(vehicles="a,z"), "no vehicle 'z'"),
-        (LogConfig(vehicles="a"), "at least 2"),
-        (LogConfig(start=50.0), "only 12.0 s"),
-    ):
-        with pytest.raises(InputError, match=words):
-            read_log(tmp_path / "bag", config)
+    with pytest.raises(InputError, match="at least 2"):
+        read_log(tmp_path / "bag", LogConfig(vehicles="a"))
 
 
 def test_several_tracks_are_several_encounters(tmp_path, plain):
@@ -519,47 +500,57 @@ def test_several_tracks_are_several_encounters(tmp_path, plain):
     ]
 
 
-def test_unknown_types_are_named(tmp_path):
-    text = bytes(STORES.serialize_cdr(STORES.types[STRING](data="hi"), STRING))
-    bag = write(tmp_path / "bag", [Line("/chatter", STRING, 1, text)])
-    with pytest.raises(
-        InputError,
-        match=rf"no topic to read, it has /chatter \({STRING}\). Needed per vehicle: {FIX}",
-    ):
-        read_log(bag)
-    with pytest.raises(InputError, match=rf"topic /chatter: type {STRING} is not one of"):
-        read_log(bag, LogConfig(topics="/chatter"))
-    with pytest.raises(InputError, match="has no topic '/fix'; it has /chatter"):
-        read_log(bag, LogConfig(topics="/fix"))
-
-
-def test_topics_that_cannot_be_told_apart(tmp_path):
-    lines = streams(crossing())
-    twice = [*lines, Line("/vehicle_a/gps", FIX, lines[0].stamp, lines[0].data)]
-    with pytest.raises(InputError, match="/vehicle_a/fix and /vehicle_a/gps are both"):
-        read_log(write(tmp_path / "twice", twice))
-    with pytest.raises(InputError, match=r"choose with --set log\.topics"):
-        read_log(write(tmp_path / "mixed", [*lines, *odometry(crossing())]))
-    with pytest.raises(InputError, match="speeds but no positions of a, b"):
-        read_log(write(tmp_path / "speeds", [line for line in lines if line.type == TWIST]))
-
-
-def test_a_damaged_message_is_named(tmp_path):
-    lines = streams(crossing())
-    lines[8].data = lines[8].data[:20]
-    with pytest.raises(InputError, match=rf"topic /vehicle_a/fix, message 3: not a {FIX}"):
-        read_log(write(tmp_path / "bag", lines))
-
-
 @pytest.mark.parametrize("frame", ["gps" + "x" * k for k in range(9)])
 def test_fix_is_read_with_any_frame(frame):
-    store = type_store()
-    types = store.types
-    fix = types[FIX](
-        types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](7, 5), frame),
-        types["sensor_msgs/msg/NavSatStatus"](0, 1),
-        *(48.1, 11.5, 500.0, np.zeros(9), 0),
-    )
-    (samples,) = decode_samples([bytes(store.serialize_cdr(fix, FIX))], FIX, str)
+    fix = fix_of(header(7_000_000_005, frame), 48.1, 11.5)
+    (samples,) = decode_samples([fix], FIX, str)
     assert samples.fix.tolist() == [[48.1, 11.5]] and samples.height.tolist() == [500.0]
     assert samples.stamp_ns.tolist() == [7_000_000_005] and samples.frame == ""
+
+
+def chatter(_):
+    text = STORES.serialize_cdr(STORES.types[STRING](data="hi"), STRING)
+    return [Line("/chatter", STRING, 1, bytes(text))]
+
+
+def damaged(rows):
+    lines = streams(rows)
+    return [*lines[:8], replace(lines[8], data=lines[8].data[:20]), *lines[9:]]
+
+
+def two_receivers(rows):
+    lines = streams(rows)
+    return [*lines, replace(lines[0], topic="/vehicle_a/gps")]
+
+
+REFUSED = {  # name: what is recorded, topics that are asked for, what the error names
+    "frames of vehicles": (lambda rows: odometry(rows, frame="{}/odom"), "", "a/odom.*b/odom"),
+    "a frame of odometry": (lambda rows: odometry(rows, frame="odom"), "", "'odom'"),
+    "a frame that moves": (lambda rows: odometry(rows, frame="a/base_link"), "", "a/base_link"),
+    "unknown types": (chatter, "", rf"/chatter \({STRING}\).*{FIX}"),
+    "an unknown type that is asked for": (chatter, "/chatter", rf"/chatter: type {STRING}"),
+    "no such topic": (chatter, "/fix", "'/fix'.*/chatter"),
+    "two odometries": (
+        lambda rows: [
+            *odometry(of(rows, "a"), "/odom"),
+            *odometry(of(rows, "a"), "/odometry/filtered"),
+        ],
+        "",
+        "one vehicle",
+    ),
+    "two receivers": (two_receivers, "", "/vehicle_a/fix and /vehicle_a/gps"),
+    "mixed types": (lambda rows: [*streams(rows), *odometry(rows)], "", r"log\.topics"),
+    "speeds alone": (
+        lambda rows: [line for line in streams(rows) if line.type == TWIST],
+        "",
+        "positions of a, b",
+    ),
+    "a damaged message": (damaged, "", rf"/vehicle_a/fix, message 3: not a {FIX}"),
+}
+
+
+@pytest.mark.parametrize(("recorded", "topics", "said"), REFUSED.values(), ids=REFUSED)
+def test_unusable_topics_are_named(tmp_path, recorded, topics, said):
+    bag = write(tmp_path / "bag", recorded(crossing()))
+    with pytest.raises(InputError, match=said):
+        read_log(bag, LogConfig(topics=topics))
