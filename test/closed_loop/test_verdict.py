@@ -205,17 +205,6 @@ def test_json_junit_rates_and_bars(trials):
     ]
 
 
-def test_reasons_of_straight_contacts():
-    stands, comes = straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)
-    ahead = straight(30.0, 0, 0, 4.0)
-    for motions, reason in (
-        ([comes, stands], "rear_end"),
-        ([stands, comes], "standing"),
-        ([ahead, comes], "other_ran_into_ego"),
-    ):
-        assert verdict_of(motions, go_on)[0].fault == reason
-
-
 def test_reference_speed_passes_standing_does_not():
     motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
     assert verdict_of(motions, go_on)[0].fault == ""
