@@ -24,7 +24,7 @@ class Planted:
 
 
 def write_archive(folder: Path, seed: int = 0, **settings: float) -> Path:
-    """Write an archive with settings of `ArchiveConfig` (test/worlds/archives.py); return its folder."""
+    """Write an archive with settings of `ArchiveConfig`; return its folder."""
     words = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
     subprocess.run(
         [sys.executable, str(SCRIPT), str(folder), f"--seed={seed}", *words],

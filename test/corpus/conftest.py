@@ -4,7 +4,7 @@
 """One small archive and its corpus for all tests of the folder; they share a worker."""
 
 import pytest
-from support.archives import ArchiveConfig, write_archive
+from synthetic_archive import ArchiveConfig, write_archive
 
 from scenario_gen.corpus.mine import mine
 

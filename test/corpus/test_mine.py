@@ -9,8 +9,8 @@ import shutil
 from hypothesis import given, strategies
 import numpy as np
 import pytest
-from support.archives import read_planted
 from support.killed import killed_in
+from synthetic_archive import read_planted
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import sha256_of

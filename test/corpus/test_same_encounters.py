@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pyproj
 import pytest
-from support.archives import ArchiveConfig, read_planted, write_archive
+from synthetic_archive import ArchiveConfig, read_planted, write_archive
 
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.inventory import inventory
