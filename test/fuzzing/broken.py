@@ -15,13 +15,13 @@ import struct
 import tempfile
 import zlib
 
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 import pandas as pd
 from PIL import Image
 import pyarrow as pa
 from pyarrow import parquet
 from support.bag_examples import hand_made_run
-from support.cut_bags import small_bag
+from support.cut_bags import mcap_bytes, small_bag
 from support.log_builders import crossing
 
 from scenario_gen.bags.recordings.write import write_recording
@@ -80,18 +80,9 @@ IMAGES = {
 
 def mcap(compression: CompressionType = CompressionType.NONE) -> bytes:
     """A small bag of several chunks by the mcap library."""
-    out = BytesIO()
-    writer = Writer(out, chunk_size=300, compression=compression)
-    writer.start("ros2")
-    channel = writer.register_channel(
-        "/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-    )
-    for k in range(40):
-        writer.add_message(
-            channel, 1000 + k, b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), 1000 + k
-        )
-    writer.finish()
-    return out.getvalue()
+    text = b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00"
+    messages = ((1000 + k, text + bytes([k])) for k in range(40))
+    return mcap_bytes(messages, chunk_size=300, compression=compression)
 
 
 def at_record(data: bytes, opcode: int, offset: int, value: bytes) -> bytes:
@@ -234,16 +225,9 @@ TABLES: dict[str, Make] = {
 
 def zstd_bomb() -> bytes:
     """A bag of a few kilobytes whose only chunk holds a hundred megabytes, and says more."""
-    out = BytesIO()
-    writer = Writer(out, chunk_size=1 << 30, compression=ZSTD)
-    writer.start("ros2")
-    channel = writer.register_channel(
-        "/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-    )
-    for k in range(10):
-        writer.add_message(channel, k, bytes(10_000_000), k)
-    writer.finish()
-    return at_record(out.getvalue(), CHUNK, 9 + 16, (2_500_000_000).to_bytes(8, "little"))
+    messages = ((k, bytes(10_000_000)) for k in range(10))
+    whole = mcap_bytes(messages, chunk_size=1 << 30, compression=ZSTD)
+    return at_record(whole, CHUNK, 9 + 16, (2_500_000_000).to_bytes(8, "little"))
 
 
 PARAMETERS = "/**:\n  ros__parameters:\n    log:\n      start: {}\n"

@@ -82,38 +82,13 @@ def test_every_node_has_an_executable():
         assert callable(getattr(importlib.import_module(module), function)), name
 
 
-@pytest.fixture(scope="module")
-def colcon(tmp_path_factory):
-    """What runs a verb of colcon on this package, with everything that it writes in one folder outside of it."""
-    base = tmp_path_factory.mktemp("workspace")
-
-    def run(verb, *options):
-        command = [
-            Path(sys.executable).with_name("colcon"),
-            "--log-base",
-            base / "log",
-            verb,
-            *options,
-        ]
-        return subprocess.run(command, cwd=base, capture_output=True, text=True, check=False)
-
-    places = (
-        "--base-paths",
-        ROOT,
-        "--build-base",
-        base / "build",
-        "--install-base",
-        base / "install",
-    )
-    built = run("build", *places)
-    assert built.returncode == 0, built.stderr
-    return base, places, run
-
-
-def test_colcon_builds_what_ros2_run_needs(colcon):
+def test_colcon_builds_what_ros2_run_needs(tmp_path):
     """A real colcon build: executables in lib/, the ament index entry, and an executable that runs from there."""
-    base, _, _ = colcon
-    prefix = base / "install" / "scenario_gen"
+    command = [Path(sys.executable).with_name("colcon"), "--log-base", tmp_path / "log", "build"]
+    command += ["--base-paths", ROOT, "--build-base", tmp_path / "build"]
+    command += ["--install-base", tmp_path / "install"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    prefix = tmp_path / "install" / "scenario_gen"
     names = "segmenter planner gp_sampler road_server log_player evaluator recorder player suite scenario-gen"
     nodes = set(names.split())
     executables = list((prefix / "lib" / "scenario_gen").iterdir())
@@ -144,7 +119,7 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     command = [sys.executable, prefix / "lib" / "scenario_gen" / "scenario-gen", "--help"]
     variables = os.environ | {"PYTHONPATH": str(packages)}
     ran = subprocess.run(
-        command, cwd=base, env=variables, capture_output=True, text=True, check=False
+        command, cwd=tmp_path, env=variables, capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0 and "generate" in ran.stdout, ran.stderr
 

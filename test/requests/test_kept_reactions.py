@@ -7,21 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.given import answer, Given
 from support.reaction_scenes import answering, crossing, lane_encounter, platoon, wander
 
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.method.chain import Chain
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
 from scenario_gen.types import FOLLOW, join_ego
 from scenario_gen.types.request import Request
 
-CONFIG = PipelineConfig()
 LANE = lane_encounter(LEADER := wander(np.random.default_rng(3), 200), answering(LEADER, 1.2, 0.9))
 
 
@@ -33,13 +32,9 @@ def late(encounter, who, sample):
 
 
 def made(encounter, request=Request(), count=20):
-    road, segmentation = (
-        build_road("corridor", encounter, CONFIG.road),
-        segment(encounter, CONFIG.segmentation, 1),
-    )
-    return Chain(
-        Situation.of(encounter), segmentation, road, CONFIG, request, count=count, seed=1
-    ).run()
+    road, segmentation = build_road("corridor", encounter), segment(encounter, seed=1)
+    given = Given(encounter, segmentation, road, 1, sampling=SamplingConfig())
+    return answer(given, request, count=count)
 
 
 def wholes(result):

@@ -3,11 +3,13 @@
 
 """A bag of several small chunks to cut and damage, and what the mcap library says of its chunks."""
 
+from collections.abc import Iterable
 from io import BytesIO
 from pathlib import Path
 
 from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk, StreamReader
+from mcap.writer import Writer
 
 from scenario_gen.bags.storage.writer import BagWriter
 
@@ -35,3 +37,22 @@ def chunk_ends(whole: bytes) -> list[tuple[int, int]]:
             count += sum(isinstance(inner, Message) for inner in breakup_chunk(record))
             found.append((stream.tell(), count))
     return found
+
+
+def mcap_bytes(
+    messages: Iterable[tuple[int, bytes]],
+    *,
+    encoding: str = "cdr",
+    profile: str = "ros2",
+    **options,
+) -> bytes:
+    """Return an MCAP file by the mcap library, of messages (stamp [ns], data) on /t; `options` are those of its writer."""
+    out = BytesIO()
+    writer = Writer(out, **options)
+    writer.start(profile)
+    schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+    channel = writer.register_channel("/t", encoding, schema)
+    for stamp_ns, data in messages:
+        writer.add_message(channel, stamp_ns, data, stamp_ns)
+    writer.finish()
+    return out.getvalue()

@@ -3,6 +3,8 @@
 
 """Live scenarios are whole in whatever order their messages come, and only then."""
 
+from dataclasses import replace
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -14,7 +16,7 @@ from msg_conventions.scenarios import encode_scenario, messages_of
 from scenario_gen.bags.recordings.scenario_decoder import INFO, ScenarioDecoder, SCENARIOS, WITNESS
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import join_ego, with_witness
-from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario
+from scenario_gen.types.scenario import BoundaryStates, EgoSlot
 
 
 def set_of(count):
@@ -24,16 +26,7 @@ def set_of(count):
         all_of_it = scenario(7 + index, n=4)
         last = len(all_of_it.time) - 1
         present = np.array([[0, last], [2, last], [2, last - 3], [1, last]])
-        arrays = (
-            all_of_it.time,
-            all_of_it.position,
-            all_of_it.heading,
-            all_of_it.speed,
-            all_of_it.acceleration,
-        )
-        one = with_witness(
-            Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present=present), 3
-        )
+        one = with_witness(replace(all_of_it, seed=3, index=index, present=present), 3)
         data = encode_scenario(one, 17)
         slot = EgoSlot(one.reference_drive.vehicles[0], np.zeros(4), np.ones(4))
         asked = BoundaryStates(np.zeros((4, 4)), np.ones((4, 4)))

@@ -8,9 +8,10 @@ import re
 import resource
 import shutil
 
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 import pytest
 from support.bag_examples import copied, hand_made_run
+from support.cut_bags import mcap_bytes
 
 from msg_conventions import trajectory
 from scenario_gen.bags.recordings.write import result_messages, write_recording
@@ -31,14 +32,8 @@ def test_a_bag_without_metadata_is_read(tmp_path):
 
 def bomb(path, size, chunks=1):
     """An MCAP file of a few kilobytes per gigabyte: chunks of `size` zeros in one message each."""
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=1, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2")
-        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-        channel = writer.register_channel("/t", "cdr", schema)
-        for k in range(chunks):
-            writer.add_message(channel, log_time=k, data=bytes(size), publish_time=k)
-        writer.finish()
+    messages = ((k, bytes(size)) for k in range(chunks))
+    path.write_bytes(mcap_bytes(messages, chunk_size=1, compression=CompressionType.ZSTD))
     return path
 
 

@@ -3,12 +3,11 @@
 
 """Bags that were cut off, damaged or never closed: what is whole before that is read, and the rest is named."""
 
-from io import BytesIO
 import random
 
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 import pytest
-from support.cut_bags import chunk_ends, small_bag
+from support.cut_bags import chunk_ends, mcap_bytes, small_bag
 from support.lengths import LONG
 
 from scenario_gen.bags.storage.bag import bag_warnings, read_messages
@@ -66,22 +65,11 @@ def test_damaged_chunk_is_named_after_others(bag):
         assert read == [data for *_, data in messages[:before]]
 
 
-def loose(path):
-    """A file without chunks, whose messages are not in order; return its bytes."""
-    stream = BytesIO()
-    writer = Writer(stream, use_chunking=False, compression=CompressionType.NONE)
-    writer.start(profile="ros2")
-    schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-    channel = writer.register_channel("/t", "cdr", schema)
-    for k in range(40):
-        writer.add_message(channel, log_time=100 - k, data=bytes([k] * 12), publish_time=k)
-    writer.finish()
-    path.write_bytes(stream.getvalue())
-    return stream.getvalue()
-
-
 def test_loose_messages_are_sorted(tmp_path):
-    whole = loose(tmp_path / "loose.mcap")
+    """In a file without chunks."""
+    messages = ((100 - k, bytes([k] * 12)) for k in range(40))
+    whole = mcap_bytes(messages, use_chunking=False, compression=CompressionType.NONE)
+    (tmp_path / "loose.mcap").write_bytes(whole)
     assert [m.stamp_ns for m in read_messages(tmp_path / "loose.mcap")] == list(range(61, 101))
     assert not bag_warnings(tmp_path / "loose.mcap")
     (tmp_path / "loose.mcap").write_bytes(whole[: len(whole) // 2])

@@ -4,14 +4,13 @@
 """Bags of all kinds as raw messages: compressed by file or message, SQLite that is no table, damage of every kind an error."""
 
 import contextlib
-from io import BytesIO
 import sqlite3
 
-from mcap.writer import Writer
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
+from support.cut_bags import mcap_bytes
 
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.config import BagConfig
@@ -82,14 +81,7 @@ def test_a_changed_database_is_an_error(tmp_path, statement):
     [("json", "ros2", "/t is encoded as 'json'"), ("ros1", "ros1", "/t is encoded as 'ros1'")],
 )
 def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
-    stream = BytesIO()
-    writer = Writer(stream)
-    writer.start(profile=profile)
-    channel = writer.register_channel(
-        "/t", encoding, writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-    )
-    writer.add_message(channel, log_time=1, data=b"{}", publish_time=1)
-    writer.finish()
-    (tmp_path / "a.mcap").write_bytes(stream.getvalue())
+    data = mcap_bytes([(1, b"{}")], encoding=encoding, profile=profile)
+    (tmp_path / "a.mcap").write_bytes(data)
     with pytest.raises(InputError, match=said):
         list(read_messages(tmp_path / "a.mcap"))

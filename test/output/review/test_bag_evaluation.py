@@ -17,15 +17,11 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.chain import Chain
 from scenario_gen.method.evaluation import EvaluationConfig
-from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.output.review.evaluation import evaluate_bag
-from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
+from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types.scenario import Cause, ScenarioSet
 
 QUICK = PipelineConfig(evaluation=EvaluationConfig(resamples=50))
@@ -40,16 +36,7 @@ def results(bag, config=QUICK):
 def real_run():
     """The synthetic merging case on a straight road."""
     (encounter,) = read_log([bundled("c")]).encounters
-    config = PipelineConfig()
-    road = build_road("straight", encounter, config.road)
-    return Chain(
-        Situation.of(encounter),
-        segment(encounter, config.segmentation, 7),
-        road,
-        config,
-        count=3,
-        seed=7,
-    ).run()
+    return generate(encounter, "straight", QUICK, count=3, seed=7)
 
 
 def test_the_figures_survive_the_bag(tmp_path):

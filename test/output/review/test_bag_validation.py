@@ -9,6 +9,7 @@ from itertools import count
 import numpy as np
 import pytest
 from support.bag_examples import copied, skipped, unaccounted
+from support.given import answer, Given
 from typer.testing import CliRunner
 
 from msg_conventions.scenarios import digest, encode_scenario
@@ -20,32 +21,24 @@ from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.chain import Chain
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.evaluation import evaluate_bag
-from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, Cause
+
+QUICK = {"evaluation.resamples": 10}
 
 
 @pytest.fixture(scope="module")
 def run():
     """A real run: the synthetic merging case on a straight road."""
     (encounter,) = read_log([bundled("c")]).encounters
-    config = PipelineConfig(sampling=SamplingConfig(drivers=0.0))
-    road = build_road("straight", encounter, config.road)
-    return Chain(
-        Situation.of(encounter),
-        segment(encounter, config.segmentation, 7),
-        road,
-        config,
-        count=4,
-        seed=7,
-    ).run()
+    road = build_road("straight", encounter)
+    return answer(Given(encounter, segment(encounter, seed=7), road, 7), Request(), count=4)
 
 
 def counts(found):
@@ -98,16 +91,7 @@ def test_each_fault_has_cause_and_place(run, tmp_path):
 def test_reactions_are_proven_again(tmp_path):
     """The bundled case b has a yielder; hold it to more than it was held to."""
     (encounter,) = read_log([bundled("b")]).encounters
-    config = PipelineConfig()
-    road = build_road("t_intersection", encounter, config.road)
-    made = Chain(
-        Situation.of(encounter),
-        segment(encounter, config.segmentation, 7),
-        road,
-        config,
-        count=4,
-        seed=7,
-    ).run()
+    made = generate(encounter, "t_intersection", QUICK, count=4, seed=7)
     assert [str(edge.named("12")) for edge in made.generated.reactions] == ["2 yields to 1"]
     bag = write_recording(tmp_path / "b", {"/here": made})
     (kept,) = evaluate_bag(bag)
@@ -213,15 +197,8 @@ def without_infos(bag, target, infos):
 
 def test_ego_is_checked_with_its_witness(run, tmp_path):
     """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
-    slot = Chain(
-        Situation.of(run.encounter),
-        run.segmentation,
-        run.road,
-        PipelineConfig(),
-        Request(ego="2"),
-        count=3,
-        seed=4,
-    ).run()
+    given = Given(run.encounter, run.segmentation, run.road, 4, sampling=SamplingConfig())
+    slot = answer(given, Request(ego="2"), count=3)
     whole = evaluate_bag(write_recording(tmp_path / "whole", slot))[0]
     assert (len(whole.verdicts), whole.causes, skipped(whole)) == (3, {}, {})
 
