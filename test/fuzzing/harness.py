@@ -4,13 +4,12 @@
 """Fuzzing: readers get damaged inputs, and nothing but an error of ours may come out, in little time and little memory.
 
 A target is a reader with valid inputs and ways to damage them (modules `targets_*.py`). Input number k of a target is made from
-k alone, so a run can be stopped and go on, and a failure can be made again. Executions happen in a child process that is forked
+k alone, so a failure can be made again. Executions happen in a child process that is forked
 once and tells its parent which number it is at; so a crash of native code or a hang is seen and known by its input.
 """
 
 from collections.abc import Callable, Sequence
-import contextlib
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 import faulthandler
 from fnmatch import fnmatch
 import gc
@@ -43,8 +42,6 @@ HEADROOM = (
     3 << 30
 )  # bytes of address space that an execution may ask for: more is refused, so that the machine lives on
 SILENT = 300  # s that an execution may take: after that it hangs outside of Python
-BATCH = 5000  # executions of one child
-SAVED = 30.0  # s after which a child makes room for the next, and progress is kept: who is stopped loses no more
 
 Mutator = Callable[[random.Random, bytes, Sequence[bytes]], bytes]
 
@@ -71,23 +68,11 @@ class Target:
 
 
 @dataclass
-class Failure:
-    """What came out where nothing but an error of ours may: the first input that shows it, and how many there were."""
-
-    signature: str
-    message: str
-    file: str
-    count: int = 1
-
-
-@dataclass
 class Record:
-    """How far the fuzzing of a target has come."""
+    """How often a target was executed, and what came out where nothing but an error of ours may, by its signature."""
 
-    target: str
     executions: int = 0
-    seconds: float = 0.0
-    failures: dict[str, Failure] = field(default_factory=dict)
+    failures: dict[str, str] = field(default_factory=dict)
 
 
 class OverTimeError(BaseException):
@@ -241,55 +226,29 @@ def batch(
 
 def fuzz(
     target: Target,
-    state: Path,
+    folder: Path,
     executions: int,
     seconds: float,
     seeds: Sequence[bytes] | None = None,
 ) -> Record:
-    """Fuzz a target until it has had so many executions or so much time, those of earlier runs on `state` included.
+    """Fuzz a target until it has had so many executions or so much time.
 
     Args:
         target: the reader.
-        state: folder that keeps progress and the inputs that failed.
+        folder: it keeps the first input of each signature of a failure.
         executions: at most so many.
         seconds: at most so long (real time; ends after the execution that runs).
         seeds: its corpus, where that has been made already.
-
-    Returns:
-        What was done so far.
     """
-    state.mkdir(parents=True, exist_ok=True)
-    record = load(state, target.name)
+    folder.mkdir(parents=True, exist_ok=True)
     seeds = corpus(target) if seeds is None else seeds
-    while record.executions < executions and record.seconds < seconds:
-        started = time.monotonic()
-        last = min(record.executions + BATCH, executions)
-        until = started + min(seconds - record.seconds, SAVED)
-        record.executions, found = batch(target, seeds, record.executions, last, until)
+    record, until = Record(), time.monotonic() + seconds
+    while record.executions < executions and time.monotonic() < until:
+        record.executions, found = batch(target, seeds, record.executions, executions, until)
         for number, kind, message in found:
-            known = record.failures.get(kind)
-            if known:
-                known.count += 1
+            if kind in record.failures:
                 continue
-            file = state / f"{target.name}_{re.sub(r'[^0-9A-Za-z]+', '_', kind)[:100]}"
+            file = folder / f"{target.name}_{re.sub(r'[^0-9A-Za-z]+', '_', kind)[:100]}"
             file.write_bytes(damaged(target, seeds, number))
-            record.failures[kind] = Failure(kind, message, file.name)
-        record.seconds += time.monotonic() - started
-        save(state, record)
+            record.failures[kind] = f"{message} ({file})"
     return record
-
-
-def load(state: Path, name: str) -> Record:
-    """Return the record that a state folder keeps of a target, or an empty one."""
-    with contextlib.suppress(FileNotFoundError):
-        values = json.loads((state / f"{name}.json").read_text())
-        failures = {kind: Failure(**failure) for kind, failure in values["failures"].items()}
-        return Record(**(values | {"failures": failures}))
-    return Record(name)
-
-
-def save(state: Path, record: Record) -> None:
-    """Keep a record; a run that is stopped while writing leaves the one before."""
-    path = state / f"{record.target}.json"
-    path.with_suffix(".new").write_text(json.dumps(asdict(record), indent=2) + "\n")
-    path.with_suffix(".new").replace(path)

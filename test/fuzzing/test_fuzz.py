@@ -21,9 +21,7 @@ def test_only_own_errors_come_out(name, tmp_path):
     executions = len(seeds) + DAMAGED
     record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0, seeds=seeds)
     assert record.executions == executions
-    assert not record.failures, "\n".join(
-        f"{f.signature}: {f.message} ({tmp_path / f.file})" for f in record.failures.values()
-    )
+    assert record.failures == {}
 
 
 def test_every_log_format_has_a_target():
@@ -39,6 +37,4 @@ def test_earlier_crashes_stay_fixed(name, tmp_path):
         pytest.skip(f"{NO_RECORDS}: {CRASHES}")
     record = fuzz(TARGETS[name], tmp_path, len(seeds), seconds=600.0, seeds=seeds)
     assert record.executions == len(seeds)
-    assert not record.failures, "\n".join(
-        f"{f.signature}: {f.message}" for f in record.failures.values()
-    )
+    assert record.failures == {}

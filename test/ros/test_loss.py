@@ -13,8 +13,7 @@ import time
 import numpy as np
 import pytest
 from support.lengths import LONG
-from support.node_server import Forked, start_nodes
-from support.suite_processes import Client, Processes, RESOURCES
+from support.suite_processes import Processes, RESOURCES
 from typer.testing import CliRunner
 import yaml
 
@@ -144,10 +143,6 @@ def test_hanging_subscriber_is_waited_for_briefly(domain, client):
         hanging.wait()
 
 
-def _recorder(domain: int, bag: Path) -> Forked:
-    return start_nodes("recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
-
-
 def _scenario(k: int) -> Scenario:
     """A car that drives straight on; its message has 0.2 MB."""
     clock = np.arange(1400) * 0.1
@@ -158,10 +153,9 @@ def _scenario(k: int) -> Scenario:
     )
 
 
-def test_loss_is_reported_everywhere(domain, tmp_path):
+def test_loss_is_reported_everywhere(client, start, tmp_path):
     """A publisher that waits for nobody, and a recorder that sleeps meanwhile."""
     count, bag = 200 if LONG else 60, tmp_path / "bag"
-    client = Client(domain)
     client.hear("/diagnostics")
     client.announce("/scenarios/info")
     from rclpy.qos import QoSProfile
@@ -170,51 +164,44 @@ def test_loss_is_reported_everywhere(domain, tmp_path):
     hasty = client.node.create_publisher(
         MultiDOFJointTrajectory, "/scenarios", QoSProfile(depth=2)
     )
-    recorder = _recorder(domain, bag)
-    try:
-        client.until(lambda: hasty.get_subscription_count() == 1, "a subscriber of /scenarios")
-        client.until(
-            lambda: client.node.count_subscribers("/scenarios/info") == 1,
-            "a subscriber of /scenarios/info",
-        )
+    recorder = start("recorder", bag=bag)
+    client.until(lambda: hasty.get_subscription_count() == 1, "a subscriber of /scenarios")
+    client.until(
+        lambda: client.node.count_subscribers("/scenarios/info") == 1,
+        "a subscriber of /scenarios/info",
+    )
 
-        def publish(k: int) -> None:
-            scenario = _scenario(k)
-            data = encode_scenario(scenario, 0)
-            hasty.publish(data)
-            asked = BoundaryStates(
-                np.zeros((len(scenario.vehicles), 4)), np.zeros((len(scenario.vehicles), 4))
-            )
-            entry = scenario_entry(scenario, data, "1", template=scenario.vehicles, asked=asked)
-            client.say("/scenarios/info", encode_info(entry))
+    def publish(k: int) -> None:
+        scenario = _scenario(k)
+        data = encode_scenario(scenario, 0)
+        hasty.publish(data)
+        asked = BoundaryStates(np.zeros((1, 4)), np.zeros((1, 4)))
+        entry = scenario_entry(scenario, data, "1", template=scenario.vehicles, asked=asked)
+        client.say("/scenarios/info", encode_info(entry))
 
-        publish(0)
-        client.until(lambda: client.counted("/scenarios") == 1, "the first scenario in the bag")
-        recorder.send_signal(signal.SIGSTOP)
-        for k in range(1, count):
-            publish(k)
-        recorder.send_signal(signal.SIGCONT)
-        publish(count)
-        closing = RequestSummary(0, {}, "1", 1, *[count + 1] * 3)
-        client.say("/scenarios/info", encode_info(closing))
+    publish(0)
+    client.until(lambda: client.counted("/scenarios") == 1, "the first scenario in the bag")
+    recorder.send_signal(signal.SIGSTOP)
+    for k in range(1, count):
+        publish(k)
+    recorder.send_signal(signal.SIGCONT)
+    publish(count)
+    closing = RequestSummary(0, {}, "1", 1, *[count + 1] * 3)
+    client.say("/scenarios/info", encode_info(closing))
 
-        def told() -> str:
-            losses = [
-                s.values
-                for s in client.statuses()
-                if s.name == "/recorder: losses" and s.level is Level.WARN
-            ]
-            words = [values.get("/scenarios", "") for values in losses]
-            return next((said for said in words if "lost" in said and "are missing" in said), "")
+    def told() -> str:
+        losses = [
+            s.values
+            for s in client.statuses()
+            if s.name == "/recorder: losses" and s.level is Level.WARN
+        ]
+        words = [values.get("/scenarios", "") for values in losses]
+        return next((said for said in words if "lost" in said and "are missing" in said), "")
 
-        client.until(told, "the recorder's warning")
-        recorder.send_signal(signal.SIGINT)
-        output, _ = recorder.communicate(timeout=180.0)
-        assert recorder.returncode == 0 and "Traceback" not in output, output
-    finally:
-        recorder.kill()
-        recorder.communicate()
-        client.close()
+    client.until(told, "the recorder's warning")
+    recorder.send_signal(signal.SIGINT)
+    output, _ = recorder.communicate(timeout=180.0)
+    assert recorder.returncode == 0 and "Traceback" not in output, output
     there = len([message for message in read_messages(bag) if message.topic == "/scenarios"])
     sentence = (
         f"request 1: {there} of {count + 1} scenarios are there, {count + 1 - there} are missing"
@@ -230,28 +217,23 @@ def test_loss_is_reported_everywhere(domain, tmp_path):
     )
 
 
-def test_killed_recorder_keeps_earlier_messages(domain, tmp_path):
+def test_killed_recorder_keeps_earlier_messages(client, start, tmp_path):
     """Far less than a chunk, and then nothing: it is on the disk all the same."""
-    bag, client = tmp_path / "bag", Client(domain)
+    bag = tmp_path / "bag"
     client.hear("/diagnostics")
-    recorder = _recorder(domain, bag)
-    try:
-        client.until(
-            lambda: any(s.name == "/recorder: recorded" for s in client.statuses()), "the recorder"
-        )
-        client.announce("/report")
-        client.until(lambda: client.node.count_subscribers("/report") == 1, "a subscriber")
-        data = encode_diagnostics([Status("/evaluator: row", Level.OK, "")], 0)
-        client.say("/report", data)
-        client.until(lambda: client.counted("/report") == 1, "the message in the bag")
-        client.until(lambda: _saved(bag, data), "the message on the disk")
-        recorder.kill()
-        recorder.wait()
-        assert _saved(bag, data)
-    finally:
-        recorder.kill()
-        recorder.communicate()
-        client.close()
+    recorder = start("recorder", bag=bag)
+    client.until(
+        lambda: any(s.name == "/recorder: recorded" for s in client.statuses()), "the recorder"
+    )
+    client.announce("/report")
+    client.until(lambda: client.node.count_subscribers("/report") == 1, "a subscriber")
+    data = encode_diagnostics([Status("/evaluator: row", Level.OK, "")], 0)
+    client.say("/report", data)
+    client.until(lambda: client.counted("/report") == 1, "the message in the bag")
+    client.until(lambda: _saved(bag, data), "the message on the disk")
+    recorder.kill()
+    recorder.wait()
+    assert _saved(bag, data)
 
 
 def _saved(bag: Path, data: bytes) -> bool:

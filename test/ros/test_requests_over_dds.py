@@ -73,6 +73,12 @@ def published(client, result):
     return [entry.sha256 for entry in own], own
 
 
+def asked_digests(count, **asked):
+    """Digests of the scenarios of a request in process."""
+    encounter, made = in_process(count, **asked)
+    return [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
+
+
 def test_ego_has_bytes_as_in_process(suite, client):
     client.hear("/scenarios", "/scenarios/info", "/ego/start", "/ego/goal", "/ego/witness")
     client.wait("/scenarios/info", 3)
@@ -100,21 +106,6 @@ def test_ego_has_bytes_as_in_process(suite, client):
     )
 
 
-def test_states_have_bytes_as_in_process(suite, client):
-    client.hear("/scenarios", "/scenarios/info")
-    client.wait("/scenarios/info", 3)
-    result = client.generate(count=3, **MOVED)
-    assert result.successful, result.reason
-    encounter, made = in_process(3, **MOVED)
-    assert published(client, result)[0] == [
-        digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios
-    ]
-    plain = client.generate(count=2)
-    assert published(client, plain)[0] == [
-        digest(encode_scenario(s, encounter.start_ns)) for s in in_process(2)[1].scenarios
-    ], "states are valid for their call only"
-
-
 def test_outcomes_have_bytes_as_in_process(suite, client):
     plain = in_process_result(1)
     config = PipelineConfig(sampling=SamplingConfig(decisions="drawn"))
@@ -138,11 +129,13 @@ def test_outcomes_have_bytes_as_in_process(suite, client):
         )
 
 
-def test_everything_is_in_the_bag(suite, client):
+def test_states_are_in_the_bag(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3)
-    results = [client.generate(ego="2", count=2), client.generate(count=2, **MOVED)]
+    results = [client.generate(count=2, **asked) for asked in (MOVED, {})]
     digests = [published(client, result)[0] for result in results]
+    assert digests[0] == asked_digests(2, **MOVED)
+    assert digests[1] == asked_digests(2), "states are valid for their call only"
     for topic in ("/scenarios", "/scenarios/info"):
         client.until(
             lambda topic=topic: client.counted(topic) >= len(client.heard[topic]),

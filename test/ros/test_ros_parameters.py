@@ -18,7 +18,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.ros.common.ros_parameters import config_of, converted, with_values
 from scenario_gen.ros.common.start import node_class
-from scenario_gen.ros.node_names import ALL
+from scenario_gen.ros.node_names import ALL, SUITE
 from scenario_gen.ros.nodes.gp_sampler import Config
 
 DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
@@ -91,8 +91,8 @@ def dumped(client: Client, node: str) -> dict[str, object]:
     return dict(zip(names, map(parameter_value_to_python, values), strict=True))
 
 
-def loaded(client: Client, node: str, path) -> dict[str, str]:
-    """What `ros2 param load` does with a file; return what was refused and why."""
+def loaded(client: Client, node: str, path) -> set[str]:
+    """What `ros2 param load` does with a file; return what was refused."""
     from rcl_interfaces.srv import SetParameters
 
     messages = list(parameter_dict_from_yaml_file(str(path)).values())
@@ -100,7 +100,7 @@ def loaded(client: Client, node: str, path) -> dict[str, str]:
         SetParameters, f"{node}/set_parameters", SetParameters.Request(parameters=messages)
     ).results
     return {
-        message.name: result.reason
+        message.name
         for message, result in zip(messages, results, strict=True)
         if not result.successful
     }
@@ -123,64 +123,35 @@ def test_nodes_load_their_dumped_parameters(domain, client, tmp_path):
     process = start_nodes("suite", "--namespace", "/a", "--ros-args", *words, **where)
     bag = ("-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true")
     player = start_nodes("player", "--ros-args", "-r", "__ns:=/a", *bag, **where)
+
+    def reloaded(node: str, values: dict[str, object]) -> set[str]:
+        """Load a file of parameters; return the names of those that are refused."""
+        file = tmp_path / f"{node}.yaml"
+        file.write_text(yaml.dump({f"/a/{node}": {"ros__parameters": values}}))
+        return loaded(client, f"/a/{node}", file)
+
+    def typed(values: dict[str, object]) -> dict[str, tuple[type, object]]:
+        return {key: (type(value), value) for key, value in values.items()}
+
     try:
-        for name in (
-            "gp_sampler",
-            "log_player",
-            "road_server",
-            "segmenter",
-            "planner",
-            "evaluator",
-            "recorder",
-            "player",
-        ):
-            node = f"/a/{name}"
-            before = dumped(client, node)
-            assert RESERVED in before
-            file = tmp_path / f"{name}.yaml"
-            file.write_text(yaml.dump({node: {"ros__parameters": before}}))
-            assert loaded(client, node, file) == {}, name
-            after = dumped(client, node)
-            assert {key: (type(value), value) for key, value in after.items()} == {
-                key: (type(value), value) for key, value in before.items()
-            }
-            if name == "player":
-                file.write_text(yaml.dump({node: {"ros__parameters": {"bag": "/other"}}}))
-                assert "read-only" in loaded(client, node, file)["bag"]
-            if name == "gp_sampler":
-                assert (
-                    before["ego"] == "21202"
-                    and before["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
-                )
-                assert (
-                    type(before["limits.car.max_speed"]) is float
-                    and before["limits.time_resolution"] == 1e-6
-                )
-                file.write_text(
-                    yaml.dump(
-                        {
-                            node: {
-                                "ros__parameters": {
-                                    RESERVED: False,
-                                    "ego": 7,
-                                    "limits": {"car": {"max_speed": 30}},
-                                }
-                            }
-                        }
-                    )
-                )
-                assert set(loaded(client, node, file)) == {RESERVED}, (
-                    "what is read-only is not changed"
-                )
-                changed = dumped(client, node)
-                assert (changed["ego"], changed["limits.car.max_speed"], changed[RESERVED]) == (
-                    "7",
-                    30.0,
-                    True,
-                )
-                assert type(changed["limits.car.max_speed"]) is float
-            if name == "log_player":
-                assert before["log.vehicles"] == "21202"
+        before = {name: dumped(client, f"/a/{name}") for name in (*SUITE, "player")}
+        for name, values in before.items():
+            assert RESERVED in values
+            assert reloaded(name, values) == set(), name
+            assert typed(dumped(client, f"/a/{name}")) == typed(values)
+        assert before["log_player"]["log.vehicles"] == "21202"
+        sampler = before["gp_sampler"]
+        assert sampler["ego"] == "21202"
+        assert sampler["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
+        assert type(sampler["limits.car.max_speed"]) is float
+        assert sampler["limits.time_resolution"] == 1e-6
+        assert reloaded("player", {"bag": "/other"}) == {"bag"}, "it is read-only"
+        other = {RESERVED: False, "ego": 7, "limits": {"car": {"max_speed": 30}}}
+        assert reloaded("gp_sampler", other) == {RESERVED}, "what is read-only is not changed"
+        changed = typed(dumped(client, "/a/gp_sampler"))
+        assert changed[RESERVED] == (bool, True)
+        assert changed["ego"] == (str, "7")
+        assert changed["limits.car.max_speed"] == (float, 30.0)
     finally:
         for one in (process, player):
             one.terminate()

@@ -10,26 +10,11 @@ import sys
 import time
 
 import pytest
-from support.node_server import Forked, start_nodes
 from support.suite_processes import RESOURCES
 
 from scenario_gen.bags.storage.bag import read_messages
 
 pytestmark = pytest.mark.dds
-
-
-def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.ros.common.start", node, "--ros-args", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
-    )
-
-
-def _forked(node: str, domain: int, *arguments: str) -> Forked:
-    return start_nodes(node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
 
 
 ENDS = {
@@ -39,57 +24,42 @@ ENDS = {
 }
 
 
-def test_a_recorder_closes_its_bag(domain, tmp_path):
+def test_a_recorder_closes_its_bag(start, tmp_path):
     """Three recorders of one player, each ended in its own way."""
-    player = _forked(
-        "player",
-        domain,
-        "-p",
-        f"bag:={RESOURCES / 'synthetic_c'}",
-        "-p",
-        "rate:=50.0",
-        "-p",
-        "loop:=true",
-    )
-    recording = ("-p", "topics:=/?vehicle_.*", "-p", "compress:=false")
+    player = start("player", bag=RESOURCES / "synthetic_c", rate=50.0, loop=True)
+    recording = {"topics": "/?vehicle_.*", "compress": False}
     recorders = {
-        name: _forked(
-            "recorder",
-            domain,
-            "-r",
-            f"__node:={name}",
-            "-p",
-            f"bag:={tmp_path / name}",
-            *recording,
-        )
+        name: start("recorder", "-r", f"__node:={name}", bag=tmp_path / name, **recording)
         for name in ENDS
     }
-    try:
-        deadline = time.monotonic() + 180.0
-        files = [tmp_path / name / f"{name}_0.mcap" for name in ENDS]
-        while not all(file.is_file() and file.stat().st_size > 100_000 for file in files):
-            assert time.monotonic() < deadline, "nothing was recorded"
-            time.sleep(0.1)
-        for name, signals in ENDS.items():
-            for number in signals:
-                recorders[name].send_signal(number)
-                time.sleep(0.05)
-        for process in recorders.values():
-            output, _ = process.communicate(timeout=180.0)
-            assert "Traceback" not in output, output
-            assert process.returncode == 0
-    finally:
-        player.send_signal(signal.SIGTERM)
-        output, _ = player.communicate(timeout=180.0)
-        for process in recorders.values():
-            process.kill()
+    deadline = time.monotonic() + 180.0
+    files = [tmp_path / name / f"{name}_0.mcap" for name in ENDS]
+    while not all(file.is_file() and file.stat().st_size > 100_000 for file in files):
+        assert time.monotonic() < deadline, "nothing was recorded"
+        time.sleep(0.1)
+    for name, signals in ENDS.items():
+        for number in signals:
+            recorders[name].send_signal(number)
+            time.sleep(0.05)
+    for process in recorders.values():
+        output, _ = process.communicate(timeout=180.0)
+        assert process.returncode == 0 and "Traceback" not in output, output
+    player.terminate()
+    output, _ = player.communicate(timeout=180.0)
     assert "Traceback" not in output, output
     for name in ENDS:
         assert len(list(read_messages(tmp_path / name))) > 100
 
 
 def test_ctrl_c_while_the_libraries_load(domain):
-    process = _started("gp_sampler", domain)
+    command = [sys.executable, "-m", "scenario_gen.ros.common.start", "gp_sampler"]
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
+    )
     time.sleep(0.7)
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=180.0)
@@ -141,14 +111,14 @@ def test_stuck_node_ends_all_the_same(domain, place):
     assert "Timeout" in output and f"in {place}" in output, output
 
 
-def test_bad_start_is_one_message(domain, tmp_path):
+def test_bad_start_is_one_message(start, tmp_path):
     (tmp_path / "text.mcap").write_text("no bag")
-    for node, arguments, words in (
-        ("road_server", ("-p", "road.lane_width:=-1.0"), "lane_width"),
-        ("player", ("-p", f"bag:={tmp_path / 'text.mcap'}"), "text.mcap"),
-        ("recorder", ("-p", f"bag:={tmp_path}"), "exists"),
+    for node, parameters, words in (
+        ("road_server", {"road.lane_width": -1.0}, "lane_width"),
+        ("player", {"bag": tmp_path / "text.mcap"}, "text.mcap"),
+        ("recorder", {"bag": tmp_path}, "exists"),
     ):
-        process = _forked(node, domain, *arguments)
+        process = start(node, **parameters)
         output, _ = process.communicate(timeout=180.0)
         assert process.returncode == 2
         assert words in output

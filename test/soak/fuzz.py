@@ -7,11 +7,13 @@
 """
 
 from collections.abc import Iterator
+from dataclasses import asdict
+from functools import partial
 import os
 from pathlib import Path
 import sys
 
-from figures import Figure
+from figures import Figure, kept
 from fuzzing.harness import fuzz, MEMORY, SECONDS, targets
 
 MINUTES = float(os.environ.get("MINUTES", "10"))
@@ -20,11 +22,11 @@ MINUTES = float(os.environ.get("MINUTES", "10"))
 def run(state: Path) -> Iterator[Figure]:
     """Fuzz one target after the other; those that are done are not begun again."""
     for name, target in targets().items():
-        record = fuzz(target, state, sys.maxsize, 60.0 * MINUTES)
-        found = [f"{failure.count} × {failure.signature}" for failure in record.failures.values()]
+        make = partial(fuzz, target, state, sys.maxsize, 60.0 * MINUTES)
+        record = kept(state / f"{name}.json", lambda make=make: asdict(make()))
         yield Figure(
             promise=f"{name}: damaged inputs end in errors of ours",
             asked=f"{MINUTES:g} min; each ≤ {SECONDS:g} s of CPU and ≤ {MEMORY >> 30} GiB",
-            seen=f"{record.executions} in {record.seconds / 60.0:.1f} min: {'; '.join(found) or 'nothing else'}",
-            met=not found,
+            seen=f"{record['executions']}: {'; '.join(record['failures']) or 'nothing else'}",
+            met=not record["failures"],
         )
