@@ -62,9 +62,6 @@ class Bars(Parameters):
     at_fault: float = parameter(
         0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0
     )
-    jumps: float = parameter(
-        0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0
-    )
     faults: float = parameter(
         0.0,
         "largest share of drives with a command that is missing or not finite, or a teleport",

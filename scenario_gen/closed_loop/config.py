@@ -11,7 +11,6 @@ from scenario_gen.base.road_users import TypeLimits
 REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
 FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}
 """Time [s] for which drivers predict an ego that they need not wait for."""
-TEMPLATE, NEVER = "template", "never"
 
 
 @dataclass(frozen=True)
@@ -77,12 +76,6 @@ class ClosedLoopConfig(Parameters):
         "the others replay the scenario, react to the ego early, or only to an evident conflict",
         choices=(REPLAY, REACTIVE, COMMITTED),
     )
-    yield_to_ego: str = parameter(
-        TEMPLATE,
-        "at conflicts the others wait for the ego as in the recording, or never (they still brake "
-        "for obstacles)",
-        choices=(TEMPLATE, NEVER),
-    )
     reaction: float = parameter(
         1.0,
         "mean reaction time to the ego; each driver's is drawn from half to one and a half of it",
@@ -144,9 +137,6 @@ class ClosedLoopConfig(Parameters):
         unit="m",
         low=0.1,
         high=50.0,
-    )
-    horizon: float = parameter(
-        8.0, "longest time to collision that counts", unit="s", low=0.1, high=60.0
     )
     hard_braking: float = parameter(
         4.0,

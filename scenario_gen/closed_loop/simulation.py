@@ -17,13 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.config import (
-    ClosedLoopConfig,
-    COMMITTED,
-    FORESIGHT,
-    REPLAY,
-    TEMPLATE,
-)
+from scenario_gen.closed_loop.config import ClosedLoopConfig, COMMITTED, FORESIGHT, REPLAY
 from scenario_gen.closed_loop.coordination_space import world_of
 from scenario_gen.closed_loop.criteria import find_criteria
 from scenario_gen.closed_loop.drive import Drive
@@ -249,7 +243,7 @@ class ClosedLoop:
             traits.patience,
             traits.margin,
             np.where(self.insists, FORESIGHT[COMMITTED], foresight),
-            ~self.insists & (config.yield_to_ego == TEMPLATE),
+            ~self.insists,
             config.policy != REPLAY,
             np.round(self.reactions / config.step).astype(np.int64),
         )

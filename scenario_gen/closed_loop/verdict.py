@@ -37,6 +37,7 @@ from scenario_gen.situation import conflict_of, encroachment
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
 JERK_WINDOW_S = 0.5
+MAX_TTC_S = 8.0
 MIN_STANDSTILL_S = 5.0  # an ego that stood so long at the end missed its goal for that reason
 
 
@@ -88,7 +89,7 @@ class DriveVerdict:
         obstacle: the obstacle that it touched then, "" if none.
         goal: time at the goal; NaN if the ego never reached it.
         delay: delay at the goal with respect to the witness.
-        min_ttc: least time to collision, at most the horizon; 0 at a contact.
+        min_ttc: least time to collision, at most MAX_TTC_S; 0 at a contact.
         min_gap: least distance of two footprints [m]; 0 at a contact.
         min_pet: least post-encroachment time at crossings and merges, negative if both were
             inside; 0 at a contact.
@@ -292,7 +293,7 @@ def judge(
     hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
     imposed = imposed_braking(loop, drive)
-    min_gap, min_ttc = _clearance(drive, config.horizon, hit)
+    min_gap, min_ttc = _clearance(drive, hit)
     braking = np.maximum(-drive.accelerations, 0.0)
     hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
     road = road_use(drive, loop.road, config.off_road_depth)
@@ -346,12 +347,12 @@ def _first_of_ego(
     return other, time
 
 
-def _clearance(drive: Drive, horizon: float, hit: tuple[int, float] | None) -> tuple[float, float]:
-    """Return the least distance [m] and TTC [s] of the ego and the others; NaN without others.
+def _clearance(drive: Drive, hit: tuple[int, float] | None) -> tuple[float, float]:
+    """Return the least distance [m] and TTC [s] of the ego and the others.
 
-    The TTC is at most the horizon.
+    Without others the distance is NaN. The TTC is at most MAX_TTC_S.
     """
-    gap, ttc = math.nan, horizon
+    gap, ttc = math.nan, MAX_TTC_S
     for i in range(len(drive.motion.vehicles)):
         if i == drive.ego:
             continue
