@@ -69,7 +69,7 @@ def evaluate(
             evaluations = evaluate_bag(bag, config, progress=partial(advance, "scenarios"))
         cases = [each.result for each in evaluations if each.result]
         if folder is not None:
-            write_evaluation(folder, measured(evaluations, bag), bag, config.bag)
+            write_evaluation(folder, measured(evaluations, bag), bag)
     is_valid = all(each.valid == len(each.verdicts) for each in evaluations)
     emit_json(
         valid=is_valid,

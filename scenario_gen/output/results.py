@@ -12,7 +12,6 @@ import shutil
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_results, write_recording
-from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError
@@ -129,51 +128,38 @@ def write_results(
 
 def _figures(case: GenerationResult) -> dict[str, Any]:
     """Return a case's similarity, reactions, evaluation and figures of the stages."""
+    target: dict[str, Any] = {}
+    if case.generated.reached is not None:
+        weights = {str(each.index): each.facts.weight for each in case.generated}
+        weights = {index: weight for index, weight in weights.items() if weight is not None}
+        target = {**case.generated.reached.figures(), "weights": weights}
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    figures: dict[str, Any] = {"similarity": case.similarity(), "reactions": case.reacting}
-    figures |= json.loads(case.evaluation.to_json()) | {
-        "adaptations": [str(note) for note in case.generated.adaptations]
-    }
-    fit = {} if case.fit is None else case.fit.figures()
-    coverage = {} if case.coverage is None else case.coverage.document()
-    reached = {} if case.generated.reached is None else case.generated.reached.figures()
-    weights = {
-        str(scenario.index): scenario.facts.weight
-        for scenario in case.generated.scenarios
-        if scenario.facts.weight is not None
-    }
-    figures |= {"coverage": coverage, "target": {**reached, "weights": weights} if reached else {}}
-    return figures | {
-        "fit": fit,
+    return {
+        "similarity": case.similarity(),
+        "reactions": case.reacting,
+        **json.loads(case.evaluation.to_json()),
+        "adaptations": [str(note) for note in case.generated.adaptations],
+        "coverage": {} if case.coverage is None else case.coverage.document(),
+        "target": target,
+        "fit": {} if case.fit is None else case.fit.figures(),
         "routes": {vehicle.id: route.figures() for vehicle, route in vehicles},
     }
 
 
-def write_evaluation(
-    folder: Path,
-    cases: Sequence[GenerationResult],
-    bag: Path,
-    config: BagConfig = BagConfig(),
-) -> None:
+def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path) -> None:
     """Write report, figures and table about a bag to a `folder` from `replaced_folder`.
 
     Raises:
         OSError: the disk is full, or fails.
     """
-    from scenario_gen.bags.recordings.read import INFO, read_recording  # not needed to generate
-
     write_text(folder / TABLE, as_table(cases) + "\n")
     write_text(
         folder / FIGURES,
         json.dumps({"cases": [_figures(case) for case in cases]}, indent=2) + "\n",
     )
-    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(
-        bag, config, (INFO,)
-    ).provenance
-    write_report(
-        folder / REPORT,
-        ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts),
-    )
+    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}", **cases[0].provenance}
+    page = ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts)
+    write_report(folder / REPORT, page)
 
 
 def as_table(cases: Sequence[GenerationResult]) -> str:

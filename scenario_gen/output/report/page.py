@@ -58,7 +58,11 @@ def render(report: ReportInput) -> str:
         [case_data(case, MAX_SAMPLES) for case in report.cases],
         report=report,
         views=views,
-        verdict=_verdict(views),
+        verdict={
+            "published": sum(case.published for case in report.cases),
+            "requested": sum(case.generated.requested for case in report.cases),
+            "candidates": sum(case.generated.candidates for case in report.cases),
+        },
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
     )
@@ -83,7 +87,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "k": changepoints,
         "remark": case.segmentation.remark(duration),
         "rate": changepoints / duration,
-        "errors": {key: _errors(case, key) for key in ERRORS},
+        "errors": {key: errors_of(case, key) for key in ERRORS},
         "verdict": _in_words(case),
         "reactions": case.reacting,
         "segments": _segments(case),
@@ -164,21 +168,10 @@ def _smallest(values: Iterable[float]) -> float:
     return min(filter(math.isfinite, values), default=math.nan)
 
 
-def _errors(case: GenerationResult, metric: str) -> tuple[str, str]:
-    """Return E of the set, and of the replay."""
+def errors_of(case: GenerationResult, metric: str) -> tuple[str, str]:
+    """Return E of the set, and of the replay, as texts."""
     likeness, replay = (
         formatted(Interval(case.evaluation.value(row, metric)), "")
         for row in (case.row_name, REPLAY)
     )
     return likeness, replay
-
-
-def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the figures of the page's first sentence."""
-    cases = [view["case"] for view in views]
-    sets = [case.generated for case in cases]
-    return {
-        "published": sum(case.published for case in cases),
-        "requested": sum(result.requested for result in sets),
-        "candidates": sum(result.candidates for result in sets),
-    }

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from scenario_gen.base.errors import printable
+from scenario_gen.output.report.page import errors_of
 from scenario_gen.types import (
     CAR,
     causes_in_words,
@@ -18,7 +19,6 @@ from scenario_gen.types import (
     ERRORS,
     formatted,
     GenerationResult,
-    Interval,
     NoteKind,
     REPLAY,
     routes_in_words,
@@ -168,10 +168,7 @@ def _details(case: GenerationResult, row: Row | None) -> list[Text]:
 
 def _errors(case: GenerationResult, metric: str) -> Text:
     """Return E of the set, and of the replay if there is one."""
-    likeness, replay = (
-        formatted(Interval(case.evaluation.value(row, metric)), "")
-        for row in (case.row_name, REPLAY)
-    )
+    likeness, replay = errors_of(case, metric)
     text = Text(f"  E {ERRORS[metric]} ").append(likeness, style="bold")
     if case.evaluation.row(REPLAY) is not None:
         text.append(f" (replay {replay})", style="dim")

@@ -14,7 +14,7 @@ without an entry are counted, and checked as far as possible.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -41,8 +41,8 @@ from scenario_gen.situation import red_runners, required_orders, Situation
 from scenario_gen.types import (
     at_ends,
     Cause,
-    CheckCounts,
     EgoSlot,
+    Encounter,
     Facts,
     GenerationResult,
     join_ego,
@@ -52,6 +52,7 @@ from scenario_gen.types import (
     Reaction,
     Scenario,
     ScenarioSet,
+    Segmentation,
     tokens,
     Verdict,
     Violation,
@@ -106,18 +107,15 @@ def evaluate_bag(
     Raises:
         InputError: the bag is missing or damaged, or has no scenarios.
     """
-    namespaces = [
-        namespace
-        for namespace in read_recording(path, config.bag).namespaces.values()
-        if SCENARIOS in namespace.messages
-    ]
+    recording = read_recording(path, config.bag)
+    namespaces = [each for each in recording.namespaces.values() if SCENARIOS in each.messages]
     if not namespaces:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; nothing to evaluate")
     total = sum(len(namespace.hashes) for namespace in namespaces)
     done = count(1)
     with naming_bag(path):
         return tuple(
-            _evaluate(namespace, config, lambda: progress(next(done), total))
+            _evaluate(namespace, recording.provenance, config, lambda: progress(next(done), total))
             for namespace in namespaces
         )
 
@@ -148,7 +146,10 @@ def measured(evaluations: Iterable[BagEvaluation], bag: Path) -> list[Generation
 
 
 def _evaluate(
-    namespace: Namespace, config: PipelineConfig, tick: Callable[[], None]
+    namespace: Namespace,
+    provenance: Mapping[str, str],
+    config: PipelineConfig,
+    tick: Callable[[], None],
 ) -> BagEvaluation:
     """Check the scenarios of a namespace one after the other, and measure the readable ones."""
     namespace.check_infos()
@@ -161,7 +162,7 @@ def _evaluate(
         violations = list(_alterations(namespace, k, entry))
         try:
             stamp, scenario = namespace.scenario(k)
-            checker = _checker(namespace, k, stamp, scenario, config.limits, checkers)
+            checker = _checker(namespace, entry, stamp, scenario, config.limits, checkers)
             (verdict,) = checker.check([join_ego(scenario)])
         except InputError as error:
             violations.append(Violation(Cause.UNUSABLE, 0.0, (), str(error)))
@@ -179,69 +180,70 @@ def _evaluate(
         notes.append(Note.of(NoteKind.UNACCOUNTED, **values))
     for check, number in skipped.items():
         notes.append(Note.of(NoteKind.NOT_CHECKED, count=number, check=check))
-    checked = BagEvaluation(namespace.name, tuple(verdicts), tuple(notes), None)
+    result = None
     try:
-        return replace(checked, result=_result(namespace, checked, scenarios, config))
+        result = replace(_result(namespace, verdicts, notes, scenarios), provenance=provenance)
+        result = replace(result, figures=evaluate(result, config.evaluation))
     except InputError as error:
+        result = None
         notes.append(Note.of(NoteKind.NOT_MEASURED, reason=str(error)))
-        return replace(checked, notes=tuple(notes))
+    return BagEvaluation(namespace.name, tuple(verdicts), tuple(notes), result)
 
 
 def _result(
     namespace: Namespace,
-    checked: BagEvaluation,
+    verdicts: Sequence[Verdict],
+    notes: Sequence[Note],
     scenarios: Sequence[Scenario],
-    config: PipelineConfig,
 ) -> GenerationResult:
-    """Measure the readable scenarios of a namespace.
+    """Return the readable scenarios of a namespace as a result that is not yet evaluated.
 
     Raises:
-        InputError: the bag lacks tracks or a readable scenario, or they cannot be compared.
+        InputError: the bag lacks tracks or a readable scenario.
     """
     if "tracks" not in namespace.messages or not scenarios:
         raise InputError("that needs `tracks` and a readable scenario")
     encounter = namespace.encounter
     situation = Situation.of(encounter)
     kept = set.intersection(*(set(scenario.facts.reactions) for scenario in scenarios))
-    total = len(checked.verdicts)
+    total = len(verdicts)
+    refused = Counter(each.violations[0].cause for each in verdicts if not each.valid)
     outcomes = [Note.of(NoteKind.TEXT, text=summary.sentence()) for summary in namespace.summaries]
     generated = ScenarioSet(
         total,
         scenarios,
         total,
-        Counter(CheckCounts.of_verdicts(checked.verdicts).refused),
-        (Note.of(NoteKind.BAG_MEASURED), *checked.notes, *outcomes),
+        refused,
+        (Note.of(NoteKind.BAG_MEASURED), *notes, *outcomes),
         _ego_slot(scenarios[0]),
         reactions=tuple(_named(situation, kept)),
         graph=situation.reactions,
     )
-    result = GenerationResult(
+    return GenerationResult(
         encounter,
         namespace.segmentation,
         namespace.road,
         *namespace.fit,
         generated,
         row_name=SCENARIOS,
-        valid=checked.valid,
+        valid=total - refused.total(),
         covered=coverage_of(encounter, scenarios),
     )
-    return replace(result, figures=evaluate(result, config.evaluation))
 
 
 def _checker(
     namespace: Namespace,
-    k: int,
+    entry: ScenarioEntry | None,
     stamp: int,
     scenario: Scenario,
     limits: Limits,
     known: dict[tuple[object, ...], Checker],
 ) -> Checker:
-    """Return the checker of scenario `k`, with its ego; equal requirements share one in `known`.
+    """Return the checker of a scenario, with its ego; equal requirements share one in `known`.
 
     Raises:
         InputError: a message with its requirements is damaged.
     """
-    entry = namespace.entry(k) or namespace.unknown.get(k)
     facts, states = Facts(), None
     if entry is not None:
         has_ego = scenario.reference_drive is not None
@@ -253,32 +255,26 @@ def _checker(
         states and tuple(array.tobytes() for array in vars(states).values()),
     )
     if key not in known:
-        is_ambiguous = entry is None and k in namespace.unknown and namespace.roads_differ
+        is_ambiguous = entry is None and namespace.roads_differ
         road = None if is_ambiguous else namespace.road_of(entry, stamp)
         checker = Checker(road, states, None, None, limits)
-        known[key] = _with_template(checker, namespace, entry, stamp, ids, facts)
+        encounter = namespace.tracks_of(entry, stamp)
+        if encounter is not None and 2 <= len(ids) == len({*ids} & {*tokens(encounter.ids)}):
+            segmentation = namespace.segmentation_of(encounter)
+            checker = _with_template(checker, encounter, segmentation, ids, facts)
+        known[key] = checker
     return known[key]
 
 
 def _with_template(
     checker: Checker,
-    namespace: Namespace,
-    entry: ScenarioEntry | None,
-    stamp: int,
+    encounter: Encounter,
+    segmentation: Segmentation | None,
     ids: Sequence[str],
     facts: Facts,
 ) -> Checker:
-    """Add the requirements of the template, reduced to the vehicles `ids`.
-
-    The checker is unchanged if there is no template with at least two of these vehicles.
-    """
-    encounter = namespace.tracks_of(entry, stamp)
-    if encounter is None:
-        return checker
+    """Add the requirements of the template, reduced to the vehicles `ids`."""
     template = tokens(encounter.ids)
-    if len(ids) < 2 or not set(ids) <= set(template):
-        return checker
-    segmentation = namespace.segmentation_of(encounter)
     encounter = encounter.select([template.index(name) for name in ids])
     situation = Situation.of(encounter)
     gaps = {
@@ -334,5 +330,5 @@ def _ego_slot(scenario: Scenario) -> EgoSlot | None:
     drive = scenario.reference_drive
     if drive is None:
         return None
-    states = np.column_stack([drive.position[0], drive.heading[0], drive.speed[0]])
+    (states,) = np.asarray(drive)
     return EgoSlot(drive.vehicles[0], states[0], states[-1])

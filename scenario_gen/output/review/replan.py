@@ -91,14 +91,10 @@ def _replan(where: Namespace, entry: ScenarioEntry, info: BagMessage, origin: st
     """Return the source of a scenario; `origin` names bag and request in messages."""
     summary = _summary_of(where, entry)
     template = _template(where, where.messages_of(info, entry, summary), origin)
-    encounter, road = template.encounter, template.road
-    encounter = replace(encounter, source=summary.source, name=entry.template or encounter.name)
-    template = replace(
-        template,
-        encounter=encounter,
-        road=replace(road, name=entry.road or road.name),
-        seed=entry.seed,
-    )
+    name = entry.template or template.encounter.name
+    encounter = replace(template.encounter, source=summary.source, name=name)
+    road = replace(template.road, name=entry.road or template.road.name)
+    template = replace(template, encounter=encounter, road=road, seed=entry.seed)
     values = dict(summary.provenance)
     if summary.ego is not None:
         values["ego"] = summary.ego.id
@@ -108,13 +104,12 @@ def _replan(where: Namespace, entry: ScenarioEntry, info: BagMessage, origin: st
     sampling = read_parameters(SamplingConfig(), values, "sampling.", origin)
     limits = read_parameters(Limits(), values, "limits.", origin)
     if requested.moves:  # the bag's fit may belong to another request
-        segmentation, road = template.segmentation, template.road
         fitting = read_parameters(FittingConfig(), values, "fitting.", origin)
         planning = read_parameters(PlanningConfig(), values, "planning.", origin)
         config = PipelineConfig(fitting=fitting, planning=planning, limits=limits)
         situation = Situation.of(encounter)
-        chain = Chain(situation, segmentation, road, config, requested, seed=entry.seed)
-        template = chain.plan()
+        inputs = (situation, template.segmentation, road)
+        template = Chain(*inputs, config, requested, seed=entry.seed).plan()
     return Replanned(template, requested, sampling, limits)
 
 
