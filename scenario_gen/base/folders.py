@@ -263,40 +263,30 @@ def _checked_place(target: Path, inputs: Iterable[Path]) -> Path:
     """Return the target's absolute path.
 
     Raises:
-        InputError: as `_place`, or the path cannot be used.
+        InputError: no result may be there, an input is there, or the path cannot be used.
     """
     try:
-        return _place(target, inputs)
+        place = target.resolve()
+        existing = next(folder for folder in (place, *place.parents) if folder.exists())
+        is_current = Path.cwd().is_relative_to(place)
+        inside = [path for path in inputs if path.resolve().is_relative_to(place)]
     except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null byte
         raise InputError(
             f"{target} cannot be written: {describe(error)}; name another folder"
         ) from error
-
-
-def _place(target: Path, inputs: Iterable[Path]) -> Path:
-    """Return the target's absolute path.
-
-    Raises:
-        InputError: no result may be there, or an input is there.
-    """
-    place = target.resolve()
-    existing = next(folder for folder in (place, *place.parents) if folder.exists())
-    fault = ""
     if target.is_symlink():
         fault = "is a link; name the folder that it leads to"
     elif not existing.is_dir():
         fault = f"cannot be a folder, because {existing} is a file"
-    elif Path.cwd().is_relative_to(place):
+    elif is_current:
         fault = "is the folder that you are in, or above it"
     elif os.path.ismount(place):
         fault = "is a mount point, which cannot be replaced; name a folder in it"
+    elif inside:
+        fault = f"contains {inside[-1]}, an input of this command"
     else:
-        for path in inputs:
-            if path.resolve().is_relative_to(place):
-                fault = f"contains {path}, an input of this command"
-    if fault:
-        raise InputError(f"{target} {fault}; name another folder")
-    return place
+        return place
+    raise InputError(f"{target} {fault}; name another folder")
 
 
 def _put(target: Path, place: Path, new: Path, kind: Kind) -> None:

@@ -3,7 +3,7 @@
 
 """Declarations of parameters (default, unit, range, meaning) for commands, nodes and docs/."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
@@ -57,6 +57,9 @@ def parameter(
 class Parameters:
     """Base class of configurations, which check their values on creation.
 
+    A class may have a property `of_plugins`: nested configurations from installed packages by
+    name, kept in its field `plugins`.
+
     Raises:
         InputError: a value has the wrong type or is out of range.
     """
@@ -70,11 +73,6 @@ class Parameters:
         for name in values.keys() - cls.__dataclass_fields__.keys():
             raise InputError(_unknown(cls(), name))
         return super().__new__(cls)
-
-    @property
-    def of_plugins(self) -> "Mapping[str, Parameters]":
-        """Nested configurations from installed packages by name, kept in the field `plugins`."""
-        return {}
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -131,13 +129,14 @@ def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]
             flat |= flatten(value, f"{prefix}{entry.name}.")
         elif entry.metadata:
             flat[prefix + entry.name] = (entry, value)
-    for name, value in _of_plugins(config).items():
+    for name, value in getattr(config, "of_plugins", {}).items():
         flat |= flatten(value, f"{prefix}{name}.")
     return flat
 
 
-def _of_plugins(config: Any) -> Mapping[str, Parameters]:
-    return config.of_plugins if isinstance(config, Parameters) else {}
+def values_of(config: Any) -> dict[str, Any]:
+    """Return {dotted name: value} of a configuration and those nested in it."""
+    return {name: value for name, (_, value) in flatten(config).items()}
 
 
 def _unknown(config: Any, name: str, prefix: str = "") -> str:
@@ -153,7 +152,9 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
         InputError: a name is unknown, or a value has the wrong type or is out of range.
     """
     declared = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
-    nested = _nested(config, declared)
+    nested = {name: getattr(config, name) for name in declared}
+    nested = {name: part for name, part in nested.items() if is_dataclass(part)}
+    nested |= getattr(config, "of_plugins", {})
     changes: dict[str, Any] = {}
     inner: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
@@ -193,14 +194,6 @@ def _checked(
             value = ",".join(map(str, value))
     check_value(prefix + name, entry, value)
     return float(value) if isinstance(entry.default, float) else value
-
-
-def _nested(config: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return the configurations nested in a configuration by name, with those of plugins."""
-    parts = {name: getattr(config, name) for name in names}
-    return {name: part for name, part in parts.items() if is_dataclass(part)} | dict(
-        _of_plugins(config)
-    )
 
 
 def assigned(config: Config, assignment: str) -> Config:

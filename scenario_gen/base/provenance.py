@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import scenario_gen
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import flatten, parsed, updated
+from scenario_gen.base.parameters import flatten, parsed, updated, values_of
 
 Config = TypeVar("Config")
 RECORDING = "recording"
@@ -35,7 +35,7 @@ def versions() -> dict[str, str]:
 
 def parameter_texts(config: Any) -> dict[str, str]:
     """Return {dotted name: text} of all parameters of a configuration, floats exact to the bit."""
-    return {name: str(value) for name, (_, value) in flatten(config).items()}
+    return {name: str(value) for name, value in values_of(config).items()}
 
 
 def what_makes_it_again(config: Any, request: Any) -> dict[str, str]:

@@ -3,7 +3,7 @@
 
 """An unused ROS domain on this machine, and an environment restricted to it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
@@ -77,14 +77,14 @@ def own_domain() -> Iterator[int]:
         yield domain
 
 
-def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
+def this_host_only() -> dict[str, str]:
     """Return the variables that restrict a process to communication on this host, in any domain.
 
     Fast DDS then uses UDP on the loopback device. Its shared memory, which ROS's range LOCALHOST
     includes, considers a process dead that did not run for a second, and can then deadlock living
     ones (Fast DDS issue 6484). This happened in 3 of 40 runs of 40 callers on two busy cores.
     """
-    if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps").startswith("rmw_fastrtps"):
+    if not os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps").startswith("rmw_fastrtps"):
         return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     profile = str(Path(__file__).resolve().parents[1] / "resources" / "loopback.xml")
     return {

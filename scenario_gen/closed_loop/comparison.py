@@ -13,7 +13,7 @@ import pandas as pd
 
 from scenario_gen.base.documents import parse_json, read_text
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import flatten
+from scenario_gen.base.parameters import values_of
 from scenario_gen.closed_loop.bars import FIGURES, figures_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import units_of
@@ -139,7 +139,7 @@ def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier:
     Raises:
         InputError: they differ; the message names the first scenario, or the parameters.
     """
-    parameters = {name: value for name, (_, value) in flatten(config).items()}
+    parameters = values_of(config)
     names = (parameters.keys() | earlier.parameters.keys()) - UNCOMPARED
     differ = sorted(name for name in names if parameters.get(name) != earlier.parameters.get(name))
     if differ:

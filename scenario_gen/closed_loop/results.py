@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.folders import Kind, write_text
-from scenario_gen.base.parameters import flatten
+from scenario_gen.base.parameters import values_of
 from scenario_gen.closed_loop.blind import BlindRate
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
@@ -185,7 +185,7 @@ class Drives:
         return {
             "planner": self.planner,
             **self.config.facts(),
-            "parameters": {name: value for name, (_, value) in flatten(self.config).items()},
+            "parameters": values_of(self.config),
             "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
             "baseline_pass": passed_of(self.baseline).document() if self.baseline else None,
             **{name: part and part.document() for name, part in parts.items()},
@@ -213,7 +213,7 @@ class Drives:
             broken=self.broken,
             notes=self.notes(),
             comparison=self.comparison,
-            parameters={name: value for name, (_, value) in flatten(self.config).items()},
+            parameters=values_of(self.config),
         )
 
     def facts(self) -> dict[str, str]:

@@ -24,7 +24,7 @@ from typing import Any
 
 from scenario_gen.base.errors import needs, RefusedError
 from scenario_gen.base.folders import write_text
-from scenario_gen.base.parameters import flatten
+from scenario_gen.base.parameters import values_of
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
     account_of,
@@ -287,7 +287,7 @@ def _write_page(path: Path, contents: _Contents, result: MiningSummary) -> None:
 
 def _parameters(config: CorpusConfig) -> dict[str, Any]:
     """Return the parameters on which results depend."""
-    return {name: value for name, (_, value) in flatten(config).items() if name != "memory"}
+    return {name: value for name, value in values_of(config).items() if name != "memory"}
 
 
 def _log_task(paths: list[Path], folder: Path, config: CorpusConfig) -> LogTask:

@@ -29,7 +29,6 @@ from scenario_gen.types.encounter import (
 )
 from scenario_gen.types.evaluation import (
     as_markdown,
-    CheckCounts,
     Evaluation,
     formatted,
     Interval,
@@ -160,7 +159,6 @@ __all__ = [
     "YIELD",
     "BoundaryStates",
     "Cause",
-    "CheckCounts",
     "Coverage",
     "Decided",
     "Decision",

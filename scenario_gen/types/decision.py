@@ -3,7 +3,6 @@
 
 """A decision at a conflict: which driver decides, what he does, and how likely this is."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
@@ -50,16 +49,6 @@ class Decision:
     def document(self) -> dict[str, Any]:
         """Return the decision as a JSON document."""
         return asdict(self)
-
-    @classmethod
-    def of_document(cls, values: Mapping[str, Any]) -> "Decision":
-        """Return the decision of a JSON document.
-
-        Raises:
-            ValueError, TypeError, KeyError: the document is damaged.
-        """
-        numbers = (float(values[name]) for name in ("lag", "probability"))
-        return cls(str(values["who"]), str(values["whom"]), Outcome(values["outcome"]), *numbers)
 
     def __str__(self) -> str:
         return f"vehicle {self.who} {self.outcome}"

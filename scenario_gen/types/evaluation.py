@@ -3,9 +3,8 @@
 
 """Results of the evaluation: metrics with intervals, and the measures of one scenario."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 import json
 import math
 import re
@@ -15,7 +14,7 @@ from scenario_gen.base.errors import printable
 from scenario_gen.types.facts import Facts
 from scenario_gen.types.html import html_list, html_table
 from scenario_gen.types.notes import Note
-from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet, Verdict
+from scenario_gen.types.scenario import Scenario
 from scenario_gen.types.target import Pair
 
 if TYPE_CHECKING:
@@ -43,32 +42,6 @@ class Interval:
     value: float
     low: float = float("nan")
     high: float = float("nan")
-
-
-@dataclass(frozen=True)
-class CheckCounts:
-    """The number of candidates of one row, and of refused ones by their first cause."""
-
-    candidates: int
-    refused: Mapping[Cause, int] = field(default_factory=dict)
-
-    @classmethod
-    def of_set(cls, generated: ScenarioSet) -> "CheckCounts":
-        """Take the account of a request."""
-        return cls(generated.candidates, dict(generated.refused))
-
-    @classmethod
-    def of_verdicts(cls, verdicts: Iterable[Verdict]) -> "CheckCounts":
-        """Count verdicts, one per scenario."""
-        verdicts = list(verdicts)
-        return cls(
-            len(verdicts),
-            Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid),
-        )
-
-    def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
-        """Return the number of candidates refused for one of `causes`, and of all candidates."""
-        return sum(self.refused.get(cause, 0) for cause in causes), self.candidates
 
 
 @dataclass(frozen=True)
@@ -159,10 +132,10 @@ class Evaluation:
         }
         return pd.DataFrame(rows)
 
-    def to_json(self, indent: int | None = 2) -> str:
+    def to_json(self) -> str:
         """Return JSON; what is not a number is null, figures have six significant digits."""
         document = {_KEYS.get(name, name): value for name, value in vars(self).items()} | {
-            "duration_s": _number(self.duration),
+            "duration_s": finite(self.duration),
             "metrics": [
                 {key: value for key, value in vars(metric).items() if value is not None}
                 for metric in self.metrics
@@ -173,14 +146,14 @@ class Evaluation:
                     "samples": row.samples,
                     "notes": [str(note) for note in row.notes],
                     "values": {
-                        key: {name: _number(figure) for name, figure in vars(e).items()}
+                        key: {name: finite(figure) for name, figure in vars(e).items()}
                         for key, e in row.values.items()
                     },
                 }
                 for row in self.rows
             ],
         }
-        return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
+        return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
 
     def _table(self) -> list[tuple[str, ...]]:
         """Return the header, then the cells of each metric: label, better, a figure per row."""
@@ -253,7 +226,8 @@ def formatted(
     return text
 
 
-def _number(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """Return six digits of a value; None if it is not finite."""
     return float(f"{value:.6g}") if math.isfinite(value) else None
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -18,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import Evaluation, REPLAY, WITH
+from scenario_gen.types.evaluation import Evaluation, finite, REPLAY, WITH
 from scenario_gen.types.fit import Fit, Route, Segmentation
 from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
@@ -305,7 +304,7 @@ class GenerationResult:
     def similarity(self) -> dict[str, dict[str, float | None]]:
         """Return E of `generated` and of the replay by row and metric; None where unknown."""
         return {
-            row: {metric: _rounded(self.evaluation.value(row, metric)) for metric in ERRORS}
+            row: {metric: finite(self.evaluation.value(row, metric)) for metric in ERRORS}
             for row in (self.row_name, REPLAY)
             if self.evaluation.row(row) is not None
         }
@@ -372,8 +371,3 @@ class GenerationResult:
     def published(self) -> int:
         """Number of valid scenarios."""
         return len(self.generated.scenarios) if self.valid is None else self.valid
-
-
-def _rounded(value: float) -> float | None:
-    """Return six digits of a value; None if it is not finite."""
-    return float(f"{value:.6g}") if math.isfinite(value) else None

@@ -77,8 +77,7 @@ class Lane:
             )
         if (
             self.left.shape != self.right.shape
-            or self.left.ndim != 2
-            or self.left.shape[1] != 2
+            or self.left.shape[1:] != (2,)
             or len(self.left) < 2
         ):
             raise InputError(

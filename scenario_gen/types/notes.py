@@ -37,7 +37,6 @@ class NoteKind(Enum):
     )
     TRAFFIC_RULES = "traffic rules: {rules}"
     LIGHTS_OFF = "traffic lights have no state: the signs apply"
-    LIGHTS = "traffic lights: {lights}"
     MAP_PART = "part {part} of the map"
     MAP_AROUND = "{distance:g} m around {part}"
     BEST_PLACE = "best place for the recording: {place}: {part} (cost {cost:.1f} m²)"
@@ -119,7 +118,6 @@ class NoteKind(Enum):
     SUBSET_MEASURED = (
         "measured on {measured:,} of {total:,} scenarios, in {runs} evenly spaced runs"
     )
-    RANDOM_SUBSET = "measured on {measured} of {total} scenarios, chosen with seed {seed}"
     FEW_SCENARIOS = "few scenarios: all figures come from {measured} scenarios, not {enough}"
     ONE_VEHICLE = "one vehicle is left: no pair to measure"
     E_UNDEFINED = "E for {quantity} is undefined: the recording's matrices are constant"

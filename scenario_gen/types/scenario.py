@@ -258,9 +258,6 @@ class ScenarioSet:
         return len(self.scenarios) / self.candidates if self.candidates else 0.0
 
 
-_ROWS = ("position", "heading", "speed", "acceleration")
-
-
 def split_off(scenario: Scenario, index: int) -> tuple[Scenario, Scenario]:
     """Return a scenario of all vehicles but one, and one of that one, both on the same clock."""
     rows = [n for n in range(len(scenario.vehicles)) if n != index]
@@ -273,9 +270,7 @@ def with_witness(scenario: Scenario, index: int) -> Scenario:
     It ends when the last of the other vehicles leaves.
     """
     others, witness = split_off(scenario, index)
-    last = int(others.present[:, 1].max()) + 1
-    arrays = {name: getattr(others, name)[:, :last] for name in _ROWS}
-    return replace(others, time=others.time[:last], **arrays, reference_drive=witness)
+    return replace(others.between(0, int(others.present[:, 1].max())), reference_drive=witness)
 
 
 def join_ego(scenario: Scenario) -> Scenario:
@@ -290,7 +285,7 @@ def join_ego(scenario: Scenario) -> Scenario:
     vehicles = (*scenario.vehicles, *witness.vehicles)
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name)[:, _held(part, time)] for part in parts])
-        for name in _ROWS
+        for name in scenario.array_names
     }
     present = np.concatenate([np.searchsorted(time, part.time[part.present]) for part in parts])
     return replace(parts[0], vehicles=vehicles, time=time, **arrays, present=present)
@@ -302,5 +297,7 @@ def _held(part: Scenario, time: Floats) -> Ints:
 
 
 def _of(scenario: Scenario, rows: Sequence[int]) -> Scenario:
-    arrays = {name: getattr(scenario, name)[list(rows)] for name in (*_ROWS, "present")}
+    arrays = {
+        name: getattr(scenario, name)[list(rows)] for name in (*scenario.array_names, "present")
+    }
     return replace(scenario, vehicles=tuple(scenario.vehicles[n] for n in rows), **arrays)

@@ -15,7 +15,7 @@ import pytest
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
 
-KIND = Kind("test")
+KIND = Kind("bag")
 TEXT = b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00"
 CALLS = (
     "mkdir",
@@ -33,7 +33,7 @@ CALLS = (
 
 def write_bag(target: Path, messages: int) -> None:
     """Write a bag of so many messages, whole or not at all."""
-    with atomic_bag(target, KIND, chunk_bytes=100) as bag:
+    with atomic_bag(target, chunk_bytes=100) as bag:
         bag.add_topic("/t", "std_msgs/msg/String")
         for k in range(messages):
             bag.write("/t", TEXT, k)

@@ -28,7 +28,7 @@ def test_new_result_replaces_an_earlier_one(out):
     after = content(out)
     assert after["one.txt"] == b"one.txt" * 3 and after != before
     marker = json.loads(after[MARKER])
-    assert marker["kind"] == "test" and set(marker["files"]) == {"one.txt", "inner/two.txt"}
+    assert marker["kind"] == KIND and set(marker["files"]) == {"one.txt", "inner/two.txt"}
     write_texts(out, 2)
     assert content(out) == before, "same input, same bytes, marker included"
     assert list(out.parent.iterdir()) == [out]
@@ -55,7 +55,7 @@ SPOILED = {
     "inner/notes.txt": lambda out: (out / "inner" / "notes.txt").write_text("mine"),
     "link": lambda out: (out / "link").symlink_to("/nowhere"),
     "one.txt in it": lambda out: (out / "one.txt").write_text("my own words"),
-    "earlier result (test)": lambda out: (out / MARKER).write_text(
+    "earlier result (bag)": lambda out: (out / MARKER).write_text(
         '{"kind": "another", "format": 1, "files": {}}'
     ),
     "is not an earlier result": lambda out: (out / MARKER).write_text("{"),
@@ -117,7 +117,7 @@ HOLDING = """
 import sys
 from pathlib import Path
 from scenario_gen.base.folders import Kind, replaced_folder
-with replaced_folder(Path(sys.argv[1]), Kind("test")) as folder:
+with replaced_folder(Path(sys.argv[1]), Kind("bag")) as folder:
     (folder / "half.txt").write_text("half")
     print("writing", flush=True)
     sys.stdin.read()

@@ -44,12 +44,13 @@ def test_no_other_account_reserves_domains(place):
         pass
 
 
-def test_other_middleware_stays_on_host():
-    assert this_host_only({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}) == {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"
-    }
-    for own in ({}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}):
-        assert Path(this_host_only(own)["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
+def test_other_middleware_stays_on_host(monkeypatch):
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
+    assert this_host_only() == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
+    assert Path(this_host_only()["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
+    monkeypatch.delenv("RMW_IMPLEMENTATION")
+    assert Path(this_host_only()["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
 
 
 @pytest.mark.dds

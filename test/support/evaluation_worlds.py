@@ -11,7 +11,6 @@ import numpy as np
 
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle, with_witness
-from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle, Route, Segmentation
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
@@ -109,13 +108,11 @@ def report_case(count=12, name="crossing"):
         Counter({Cause.OVERLAP: 3, Cause.LATERAL_ACCELERATION: 2}),
         (Note.of(NoteKind.STRETCHED, percent=3.0),),
     )
-    rows = {"with changepoints": near.scenarios, "replay": [oracle]}
-    checks = {"with changepoints": CheckCounts.of_set(near)}
+    rows = {"with changepoints": near, "replay": [oracle]}
     evaluation = evaluate_scenarios(
         encounter,
         rows,
         changepoints=len(segmentation.changepoints),
-        checks=checks,
         road="cross",
         config=EvaluationConfig(resamples=50),
     )

@@ -26,7 +26,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import messages_of
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
+from scenario_gen.bags.recordings.scenarios import RecordedScenarios, Roads, SCENARIOS
 from scenario_gen.bags.storage.bag import naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.messages import BagMessage
@@ -69,9 +69,6 @@ _TEMPLATE_TOPIC = re.compile(_TEMPLATE_TOPICS, re.DOTALL)
 _TOPIC = re.compile(
     rf"(?:(?P<namespace>.*?)/)?(?P<topic>{_TEMPLATE_TOPICS}|{_OTHER_TOPICS})", re.DOTALL
 )
-
-Roads = dict[tuple[str, bytes | None, str], Road]
-"""The roads of a bag by map hash, lanes and name: each is large, and decoded once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,17 +148,6 @@ class Namespace(RecordedScenarios):
     Properties for display (`segmentation`, `fit`, `entries`, …) omit missing and
     damaged messages; functions for checking or generating scenarios raise an error instead.
     """
-
-    def __init__(
-        self,
-        path: Path,
-        name: str,
-        messages: Mapping[str, Sequence[BagMessage]],
-        roads: "Roads",
-    ) -> None:
-        """Use messages by topic; roads are shared by all namespaces of a bag."""
-        self._roads = roads
-        super().__init__(path, name, messages)
 
     # The template and the road of one scenario.
 

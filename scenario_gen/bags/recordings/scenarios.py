@@ -23,18 +23,21 @@ from msg_conventions.scenarios import decode_scenario, digest
 from scenario_gen.bags.recordings.request_tracker import MessagePool, RequestTracker
 from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Scenario, ScenarioSet
+from scenario_gen.types import Road, Scenario, ScenarioSet
 
 SCENARIOS = "scenarios"
+Roads = dict[tuple[str, bytes | None, str], Road]
+"""The roads of a bag by map hash, lanes and name: each is large, and decoded once."""
 
 
 class RecordedScenarios:
     """The messages of one namespace of a bag, and the requests and scenarios among them."""
 
     def __init__(
-        self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]]
+        self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], roads: Roads
     ) -> None:
-        """Use the messages of a namespace of the bag `path`, by topic."""
+        """Use the messages of a namespace of the bag `path`, by topic; its roads are shared."""
+        self._roads = roads
         self.path = path
         self.name = name
         self._recorded = messages

@@ -3,7 +3,7 @@
 
 """A bag as rosbag2 (Jazzy) writes it: MCAP files of raw CDR messages, and metadata.yaml."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -180,21 +180,17 @@ class BagWriter:
 
 
 @contextmanager
-def atomic_bag(
-    folder: Path, kind: Kind = _WRITTEN, inputs: Iterable[Path] = (), **options: Any
-) -> Iterator[BagWriter]:
+def atomic_bag(folder: Path, **options: Any) -> Iterator[BagWriter]:
     """Yield a bag to write, which appears complete or not at all.
 
     Args:
-        folder: of the bag; it may replace an earlier one of the same kind.
-        kind: kind of the result.
-        inputs: paths that are read meanwhile, and must not be in `folder`.
+        folder: of the bag; it may replace an earlier one.
         options: those of `BagWriter`.
 
     Raises:
         InputError: the folder exists and may not be replaced, or the disk is full, or fails.
     """
-    with replaced_folder(folder, kind, inputs) as partial:
+    with replaced_folder(folder, _WRITTEN) as partial:
         partial.rmdir()  # the writer creates it
         with BagWriter(partial, **options) as writer:
             yield writer

@@ -20,7 +20,7 @@ from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
-from scenario_gen.base.parameters import assigned, flatten
+from scenario_gen.base.parameters import assigned, values_of
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.criteria import find_criteria
@@ -405,5 +405,5 @@ def _page(result: SearchResult, request: SearchRequest) -> str:
         kinds=kinds,
         shares=result.estimate.shares,
         rows=list(enumerate(ordered)),
-        parameters={name: value for name, (_, value) in flatten(request.drive_config()).items()},
+        parameters=values_of(request.drive_config()),
     )

@@ -169,14 +169,15 @@ def cycle_of(light: Element, step_s: float) -> SignalSchedule | None:
 def stop_line(lanelet: Element) -> Floats:
     """Return the stop line (2, 2) [m] of a lanelet from left to right; by default its end."""
     bounds = [lanelet.child(f"{side}Bound").findall("point") for side in ("left", "right")]
-    ends = np.array([_point(points[-1]) for points in bounds if points])
-    points = np.array([_point(point) for point in lanelet.findall("stopLine/point")])
+    ends = np.array([point_of(points[-1]) for points in bounds if points])
+    points = np.array([point_of(point) for point in lanelet.findall("stopLine/point")])
     if len(points) < 2:
         return ends
     return rightwards(points[[0, -1]], ends)
 
 
-def _point(point: Element) -> tuple[float, float]:
+def point_of(point: Element) -> tuple[float, float]:
+    """Return x, y [m] of a point."""
     return point.child("x").value(), point.child("y").value()
 
 
@@ -212,7 +213,7 @@ def _state(state: Element) -> tuple[float, float, float, float, float]:
         raise InputError(f"{state.place} has no time")
     heading = _value(state, "orientation")
     speed = abs(_value(state, "velocity"))
-    return time, point.child("x").value(), point.child("y").value(), heading, speed
+    return time, *point_of(point), heading, speed
 
 
 def _value(state: Element, tag: str) -> float:

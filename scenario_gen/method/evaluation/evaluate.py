@@ -14,7 +14,6 @@ from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.metrics import catalogue, METRICS, VALIDITY
 from scenario_gen.method.evaluation.samples import MIN_COMMON_S, Samples, Template
 from scenario_gen.types import (
-    CheckCounts,
     Encounter,
     Evaluation,
     GenerationResult,
@@ -70,8 +69,6 @@ def evaluate_scenarios(
     sets: Scenarios | Mapping[str, Scenarios],
     *,
     changepoints: int = 0,
-    checks: Mapping[str, CheckCounts] | None = None,
-    replay: str = REPLAY,
     road: str = "",
     config: EvaluationConfig = EvaluationConfig(),
     seed: int = 0,
@@ -80,14 +77,12 @@ def evaluate_scenarios(
 
     Args:
         encounter: the recorded template.
-        sets: scenarios, or several sets of them by name, each a row: "mine", "replay". A
+        sets: scenarios, or several sets of them by name, each a row. That
+            of "replay" is the fitted template, to which displacements are measured. A
             `ScenarioSet` brings its account of candidates along. An empty set gives an empty row,
             with a note. A larger set is measured on MEASURED_SCENARIOS of its scenarios, see
             `measured`.
         changepoints: their number K, shown with E, since more changepoints always fit better.
-        checks: counts of the checked candidates by row, for sets without such counts.
-        replay: the row whose first scenario is the fitted template, to which displacements are
-            measured.
         road: name of the road, for the heading.
         config: how to measure.
         seed: of the bootstrap.
@@ -102,17 +97,13 @@ def evaluate_scenarios(
         InputError: a scenario has a vehicle that the encounter has not.
     """
     named = sets if isinstance(sets, Mapping) else {"scenarios": sets}
-    counts: dict[str, CheckCounts] = {}
-    rows: dict[str, Sequence[Scenario]] = {}
-    for name, scenarios in named.items():
-        if isinstance(scenarios, ScenarioSet):
-            counts[name] = CheckCounts.of_set(scenarios)
-            rows[name] = measured(scenarios.scenarios)
-        else:
-            rows[name] = measured(scenarios)
-    counts |= checks or {}
+    counts = {name: each for name, each in named.items() if isinstance(each, ScenarioSet)}
+    rows = {
+        name: measured(each.scenarios if isinstance(each, ScenarioSet) else each)
+        for name, each in named.items()
+    }
     ids = shared_vehicles(encounter, rows)
-    replayed = next(iter(rows.get(replay, ())), None)
+    replayed = next(iter(rows.get(REPLAY, ())), None)
     steps = _steps(encounter, len(ids), config)
     template = Template(encounter, ids, steps, replayed, config, seed)
     evaluated = [

@@ -60,13 +60,14 @@ def rates(samples: Samples) -> Estimates:
     counts, level = samples.counts, samples.template.config.level
     if counts is None:
         return {}
-    accepted = counts.candidates - sum(counts.refused.values())
-    return {
-        "acceptance": wilson(accepted, counts.candidates, level),
-        "collision_rate": wilson(*counts.share_of([Cause.OVERLAP]), level),
-        "off_road_rate": wilson(*counts.share_of([Cause.OFF_ROAD]), level),
-        "limit_rate": wilson(*counts.share_of(LIMIT_CAUSES), level),
+    refused = counts.refused
+    numbers = {
+        "acceptance": counts.candidates - refused.total(),
+        "collision_rate": refused[Cause.OVERLAP],
+        "off_road_rate": refused[Cause.OFF_ROAD],
+        "limit_rate": sum(refused[cause] for cause in LIMIT_CAUSES),
     }
+    return {name: wilson(number, counts.candidates, level) for name, number in numbers.items()}
 
 
 VALIDITY = MetricGroup(

@@ -16,7 +16,7 @@ from scenario_gen.method.evaluation.dtw import Distance
 from scenario_gen.method.evaluation.measures import Criticality, criticality
 from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimilarity
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.types import CheckCounts, cut, Encounter, Fit, FittedVehicle, Motion, Scenario
+from scenario_gen.types import cut, Encounter, Fit, FittedVehicle, Motion, Scenario, ScenarioSet
 
 MAX_UNIT_COUNT = 128  # in a bootstrap of E
 MIN_COMMON_S = 1.0  # two vehicles that are present together for less are not compared
@@ -77,12 +77,12 @@ class Samples:
 
     Attributes:
         scenarios: S of them.
-        counts: the checker's counts over all candidates of the set, or None.
+        counts: the set with the account of all candidates, or None.
         template: what they were generated from.
     """
 
     scenarios: Sequence[Scenario]
-    counts: CheckCounts | None
+    counts: ScenarioSet | None
     template: Template
 
     @cached_property

@@ -17,7 +17,7 @@ import shapely
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.logs.adapters.commonroad import cycle_of, turns_of
+from scenario_gen.logs.adapters.commonroad import cycle_of, point_of, turns_of
 from scenario_gen.numerics import Floats, place
 from scenario_gen.roads.vector.drafts import (
     by_id,
@@ -333,11 +333,11 @@ def _obstacle_of(element: Element) -> Obstacle:
     """Return a static obstacle; a polygon counts as the smallest rectangle around it."""
     state = element.child("initialState")
     yaw = state.child("orientation/exact").value()
-    pose = np.array([*_point(state.child("position/point")), yaw])
+    pose = np.array([*point_of(state.child("position/point")), yaw])
     centre, turn = np.zeros(2), 0.0
     circle, polygon = element.find("shape/circle/radius"), element.find("shape/polygon")
     if polygon is not None:
-        corners = [_point(point) for point in polygon.findall("point")]
+        corners = [point_of(point) for point in polygon.findall("point")]
         box = shapely.oriented_envelope(shapely.MultiPoint(corners))
         outline = shapely.get_coordinates(box)
         if len(outline) != 5:
@@ -353,8 +353,3 @@ def _obstacle_of(element: Element) -> Obstacle:
         size = [element.child(side).value() for side in sides]
     x, y = place(pose, *centre.tolist()).tolist()
     return Obstacle(x, y, yaw + turn, *size)
-
-
-def _point(element: Element) -> tuple[float, float]:
-    """Return x, y [m] of a point."""
-    return element.child("x").value(), element.child("y").value()

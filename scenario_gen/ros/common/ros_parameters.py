@@ -26,7 +26,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import flatten, updated
+from scenario_gen.base.parameters import flatten, updated, values_of
 
 Config = TypeVar("Config")
 USAGE = "usage: {name} [--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]"
@@ -131,7 +131,7 @@ class ConfigParameters:
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
         # ROS ignores a parameter file for another node silently; the log shows it.
-        values = {name: value for name, (_, value) in flatten(self.config).items()}
+        values = values_of(self.config)
         node.get_logger().debug(f"all parameters: {_listed(values)}")
         defaults = flatten(config)
         given = {name: value for name, value in values.items() if value != defaults[name][1]}

@@ -29,7 +29,7 @@ import yaml
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, Subject
 from msg_conventions.scenario_info import decode_info, RequestSummary
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.base.parameters import flatten
+from scenario_gen.base.parameters import flatten, values_of
 from scenario_gen.base.ros_domain import own_domain
 from scenario_gen.base.signals import cleaned_up, ctrl_c_blocked, end_with_parent
 from scenario_gen.method.config import PipelineConfig
@@ -131,7 +131,7 @@ def parameters(
 
     For each node the pipeline's parameters that it declares.
     """
-    values = {name: value for name, (_, value) in flatten(config).items()}
+    values = values_of(config)
     values |= {"count": count, "seed": seed}
     common = {}
     for node in GENERATORS:

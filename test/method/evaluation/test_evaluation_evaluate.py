@@ -3,6 +3,7 @@
 
 """The evaluation as a whole: rows, notes, determinism and its documents; the oracle."""
 
+from collections import Counter
 from dataclasses import replace
 import json
 import math
@@ -14,9 +15,8 @@ from support.evaluation_worlds import CARS, crossing, replayed, samples
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig, replay
 from scenario_gen.types import ALWAYS, NoteKind
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
+from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet
 
 T = 121
 K = 2
@@ -27,21 +27,23 @@ def kinds_of(row):
     return [note.kind for note in row.notes]
 
 
-def run(**extra):
+def run(accounts=(), **extra):
     encounter = crossing()
     rows = {
         "with changepoints": samples(encounter, 50),
         "without changepoints": samples(encounter, 12, seed=4, pace=0.0),
         "replay": [replayed(encounter)],
     }
+    for name, (candidates, refused) in dict(accounts).items():
+        rows[name] = ScenarioSet(candidates, rows[name], candidates, Counter(refused))
     return evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK, **extra)
 
 
 def test_rows_say_what_happened():
     found = run(
-        checks={
-            "with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1}),
-            "without changepoints": CheckCounts(20, {Cause.OFF_ROAD: 4}),
+        accounts={
+            "with changepoints": (60, {Cause.OVERLAP: 9, Cause.SPEED: 1}),
+            "without changepoints": (20, {Cause.OFF_ROAD: 4}),
         },
         road="cross",
     )
@@ -175,16 +177,6 @@ def test_long_template_is_resampled():
         "60 steps" in str(found.row("recording").notes[0])
         and found.value("x", "e_position") < 1e-6
     )
-
-
-def test_counts_from_sets_and_verdicts():
-    made = ScenarioSet(5, (), 8)
-    made.refused[Cause.OFF_ROAD] = 3
-    assert CheckCounts.of_set(made) == CheckCounts(8, {Cause.OFF_ROAD: 3})
-    bad = Verdict(
-        (Violation(Cause.OVERLAP, 1.0, (0, 1), ""), Violation(Cause.SPEED, 1.0, (0,), ""))
-    )
-    assert CheckCounts.of_verdicts([Verdict(), bad, bad]) == CheckCounts(3, {Cause.OVERLAP: 2})
 
 
 def test_replay_keeps_dwells_and_chords():
