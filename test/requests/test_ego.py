@@ -6,11 +6,11 @@
 import numpy as np
 import pytest
 from support.given import answer
+from support.small_scenarios import moving
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.types import join_ego, Vehicle, with_witness
 from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import Scenario
 
 
 @pytest.mark.parametrize("ego", ["1", "2"])
@@ -46,16 +46,9 @@ def test_of_two_vehicles_one_is_left(chain, plain, ego):
 
 def test_parted_and_together_again():
     """Of vehicles that come and go: whoever is alone at the end leaves the others' clock shorter, and it is whole again."""
-    time = np.arange(50) * 0.1
-    position = np.stack([np.stack([10.0 * n + time, 0.0 * time], axis=1) for n in range(3)])
-    rest = (np.zeros((3, 50)), np.ones((3, 50)), np.zeros((3, 50)))
-    whole = Scenario(
-        tuple(map(Vehicle, "abc")),
-        time,
-        position,
-        *rest,
-        present=np.array([[0, 30], [5, 49], [2, 40]]),
-    )
+    rows = [[10.0 * n, 0.0, 0.0, 1.0, 0.0, 0.0] for n in range(3)]
+    present = [[0, 30], [5, 49], [2, 40]]
+    whole = moving(rows, vehicles=list(map(Vehicle, "abc")), count=50, present=present)
     parted = with_witness(whole, 1)
     assert len(parted.time) == 41 and [v.id for v in parted.vehicles] == ["a", "c"]
     back = join_ego(parted)

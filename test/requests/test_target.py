@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support.given import answer
 from support.lengths import LONG
+from support.small_scenarios import moving
 
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.method.config import PipelineConfig
@@ -18,7 +19,7 @@ from scenario_gen.method.sampling.sampler import TargetError
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.pipeline import generate
-from scenario_gen.types import Facts, join_ego, OrderChange
+from scenario_gen.types import Facts, join_ego, OrderChange, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets
 
@@ -110,8 +111,11 @@ def test_another_order_is_named(chain, tmp_path):
     )
 
 
-def test_measures_of_a_plain_crossing(crossing):
+def test_measures_of_a_plain_crossing():
     """Two cars of 4 × 2 m at 10 m/s on crossing axes; the second one's centre is 20 m later at the crossing."""
+    rows = [[-40.0, 0.0, 0.0, 10.0, 0.0, 0.0], [0.0, -60.0, 0.5 * np.pi, 10.0, 0.0, 0.0]]
+    vehicles = [Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0)]
+    crossing = moving(rows, vehicles=vehicles, count=101)
     (one,) = figures_of(crossing)
     assert one.first == 0
     assert one.arrival_gap == pytest.approx(2.0, abs=0.02)
