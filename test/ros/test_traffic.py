@@ -48,24 +48,12 @@ def traffic(start, client, bag):
 
     def run(**parameters):
         process = start("traffic", bag=bag, lock_step=True, **{"follow_on": False, **parameters})
-        client.hear(
-            "verdicts",
-            "vehicle_1/odom",
-            "vehicle_bus_2/odom",
-            "/tf",
-            "/clock",
-            "traffic/local_map",
-            "/diagnostics",
-        )
+        client.hear("verdicts", "/tf", "/clock", "traffic/local_map", "/diagnostics")
+        client.hear("vehicle_1/odom", "vehicle_bus_2/odom")
         for topic in ("ego/cmd_vel", "ego/odom", "ego/path"):
             client.announce(topic)
-        for topic in ("ego/cmd_vel", "ego/odom", "ego/path", "verdicts"):
-            count = (
-                client.node.count_publishers
-                if topic == "verdicts"
-                else client.node.count_subscribers
-            )
-            client.until(lambda count=count, topic=topic: count(topic) >= 1, topic)
+            client.until(lambda topic=topic: client.node.count_subscribers(topic), topic)
+        client.until(lambda: client.node.count_publishers("verdicts"), "verdicts")
         return process
 
     return run
@@ -77,6 +65,14 @@ def step(client):
     answer = client.call(Trigger, "/traffic/step", Trigger.Request())
     assert answer.success, answer.message
     return json.loads(answer.message)
+
+
+def drive_to_the_end(client):
+    """Command 3 m/s until the drive is over."""
+    over = False
+    while not over:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
+        over = step(client)["over"]
 
 
 class Slow:
@@ -94,10 +90,7 @@ def test_lock_step_verdict_equals_in_process(traffic, client, tmp_path):
 
     traffic(results=tmp_path / "results")
     for _ in range(2):  # and once more after a reset
-        said = {"over": False}
-        while not said["over"]:
-            client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
-            said = step(client)
+        drive_to_the_end(client)
         assert not client.call(Trigger, "/traffic/step", Trigger.Request()).success
         assert client.call(Trigger, "/traffic/reset", Trigger.Request()).success
     client.wait("verdicts", 2)
@@ -174,10 +167,7 @@ def test_ego_faults_are_reported(traffic, client):
 
     client.until(all_said, "faults on /diagnostics")
     assert process.poll() is None
-    said = {"over": False}
-    while not said["over"]:
-        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))  # a step waits for no silent ego
-        said = step(client)
+    drive_to_the_end(client)  # a step waits for no silent ego
     client.wait("verdicts")
     values = decode_diagnostics(client.heard["verdicts"][-1])[1][0].values
     assert int(values["faults"]) >= 5
@@ -232,10 +222,8 @@ def test_two_egos_and_late_commands(traffic, client):
     )  # of the drive's begin
     for _ in range(12):
         client.say("ego/cmd_vel_stamped", stale)
-        said = step(client)
-    while not said["over"]:
-        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
-        said = step(client)
+        step(client)
+    drive_to_the_end(client)
     values = decode_diagnostics(client.wait("verdicts")[-1])[1][0].values
     faults = str(values["first_faults"])
     assert "several egos" in faults and "second_planner" in faults and int(values["faults"]) > 20
@@ -286,10 +274,7 @@ def test_live_scenarios_use_their_road(start, client, sampler):
     client.announce("ego/cmd_vel")
     sampler.announce("ego/goal")
     client.until(lambda: client.node.count_subscribers("ego/cmd_vel") >= 1, "ego/cmd_vel")
-    said = {"over": False}
-    while not said["over"]:
-        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
-        said = step(client)
+    drive_to_the_end(client)
     client.wait("traffic/local_map")
     driven = [decode_diagnostics(client.wait("verdicts")[0])[1][0].subject]
     while (answer := client.call(Trigger, "/traffic/next", Trigger.Request())).success:
