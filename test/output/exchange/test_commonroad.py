@@ -30,6 +30,10 @@ def number(element, way):
     return float(element.find(way).text)
 
 
+def place(element, way="position/point"):
+    return [number(element, f"{way}/{axis}") for axis in "xy"]
+
+
 def test_the_structure_is_that_of_2020a(tmp_path):
     _, root, notes = written(tmp_path, crossing())
     assert notes == ()
@@ -74,8 +78,7 @@ def test_obstacles_are_at_their_centres(tmp_path):
         )
         for k, state in enumerate(states):
             assert int(state.find("time/exact").text) == k
-            found = [number(state, f"position/point/{axis}") for axis in "xy"]
-            assert np.allclose(found, scenario.position[n, k], atol=1e-9)
+            assert np.allclose(place(state), scenario.position[n, k], atol=1e-9)
             assert number(state, "velocity/exact") == pytest.approx(scenario.speed[n, k], abs=1e-9)
             assert number(state, "orientation/exact") == pytest.approx(
                 scenario.heading[n, k], abs=1e-9
@@ -91,23 +94,16 @@ def test_ego_problem_has_wide_window(tmp_path):
         "yawRate",
         "slipAngle",
     ]  # demanded
-    assert np.allclose(
-        [number(start, f"position/point/{axis}") for axis in "xy"], ego.position[0, 0], atol=1e-9
-    )
+    assert np.allclose(place(start), ego.position[0, 0], atol=1e-9)
     goal = problem.find("goalState")
     assert (
         number(goal, "time/intervalStart") <= 1
         and number(goal, "time/intervalEnd") * 0.1 >= 2.0 * ego.time[-1]
     )
     rectangle = goal.find("position/rectangle")
-    assert np.allclose(
-        [number(rectangle, f"center/{axis}") for axis in "xy"], ego.position[0, -1], atol=1e-9
-    )
-    assert (
-        number(goal, "orientation/intervalStart")
-        < number(rectangle, "orientation")
-        < number(goal, "orientation/intervalEnd")
-    )
+    assert np.allclose(place(rectangle, "center"), ego.position[0, -1], atol=1e-9)
+    yaws = [number(goal, f"orientation/interval{end}") for end in ("Start", "End")]
+    assert yaws[0] < number(rectangle, "orientation") < yaws[1]
     assert "placeholder" not in (tmp_path / "one.xml").read_text()
 
 
@@ -116,9 +112,11 @@ def test_placeholder_problem_is_harmless(tmp_path):
     path, root, _ = written(tmp_path, scenario)
     assert "a placeholder: the scenario has no ego" in path.read_text()
     (problem,) = root.iter("planningProblem")
-    place = [number(problem, f"initialState/position/point/{axis}") for axis in "xy"]
     assert number(problem, "initialState/velocity/exact") == 0.0
-    assert np.hypot(*(scenario.position - place).reshape(-1, 2).T).min() > 8.0
+    assert (
+        np.hypot(*(scenario.position - place(problem.find("initialState"))).reshape(-1, 2).T).min()
+        > 8.0
+    )
 
 
 def test_uneven_steps_are_resampled(tmp_path):

@@ -56,19 +56,8 @@ def test_same_bag_gives_same_bytes(small_bag, tmp_path, target):
 
 def test_chosen_scenario_with_ego_is_exported(small_bag, tmp_path):
     out = tmp_path / "out"
-    arguments = [
-        "export",
-        str(small_bag),
-        "--to",
-        "autoware",
-        "--out",
-        str(out),
-        "--index",
-        "8",
-        "--namespace",
-        "t",
-    ]
-    result = CliRunner().invoke(app, [*arguments, "--ego", "2"], catch_exceptions=False)
+    words = f"export {small_bag} --to autoware --out {out} --index 8 --namespace t --ego 2"
+    result = CliRunner().invoke(app, words, catch_exceptions=False)
     assert result.exit_code == 0 and "1 scenarios" in result.output
     (folder,) = [path for path in out.iterdir() if path.is_dir()]
     with Reader(folder) as reader:  # as others read it
