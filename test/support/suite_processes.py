@@ -100,17 +100,9 @@ class Client:
 
     def hear(self, *topics: str) -> None:
         for topic in topics:
-            self.also(topic, lambda _: None)
-
-    def also(self, topic: str, callback) -> None:
-        """Hear a topic, and call back after each message."""
-        message, quality = self._kind_of(topic)
-
-        def take(data: bytes) -> None:
-            self.heard[topic].append(data)
-            callback(data)
-
-        self.node.create_subscription(message, topic, take, quality, raw=True)
+            message, quality = self._kind_of(topic)
+            take = self.heard[topic].append
+            self.node.create_subscription(message, topic, take, quality, raw=True)
 
     def announce(self, topic: str) -> None:
         if topic not in self._publishers:
