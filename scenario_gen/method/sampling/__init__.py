@@ -8,7 +8,7 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.method.sampling.natural import NaturalScenarios
 from scenario_gen.method.sampling.plan import Callbacks, Cancelled, OnValid, Plan, Progress
-from scenario_gen.method.sampling.sampler import directions, TargetError
+from scenario_gen.method.sampling.sampler import TargetError
 from scenario_gen.method.sampling.stage import checker_of, draw_scenarios, sample_scenarios
 from scenario_gen.method.sampling.variation import relaxed_states
 
@@ -26,7 +26,6 @@ __all__ = [
     "SamplingConfig",
     "TargetError",
     "checker_of",
-    "directions",
     "draw_scenarios",
     "kept_reactions",
     "relaxed_states",

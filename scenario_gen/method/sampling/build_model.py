@@ -98,21 +98,19 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
     """
     config = config.scaled
     routed, waits = _route_vehicles(plan, config)
-    clock = _nominal_clock(routed, template_grid(plan.encounter), config)
-    stretch = _feasible_stretch(routed, clock.clock, config)
+    clock, notes = _nominal_clock(routed, template_grid(plan.encounter), config)
+    stretch = _feasible_stretch(routed, clock, config)
     if stretch.means is None:
         return BuiltModel(None, refusal=stretch.refusal)
     abreast = {n for each in plan.abreast for n in each.pair}
-    vehicles = [
-        _vehicle_model(each, plan.road, mean, config, shares_lane=n in abreast)
-        for n, (each, mean) in enumerate(zip(routed, stretch.means, strict=True))
-    ]
+    notes += stretch.notes
+    models = []
+    for n, (each, mean) in enumerate(zip(routed, stretch.means, strict=True)):
+        model, vehicle_notes = _vehicle_model(each, plan.road, mean, config, n in abreast)
+        models.append(model)
+        notes += vehicle_notes
     nominal = stretch.clock
     warp = TimeWarp(nominal, config, least_shares(nominal.grid, waits))
-    notes = [*clock.notes, *stretch.notes]
-    for vehicle in vehicles:
-        notes += vehicle.notes
-    models = [vehicle.model for vehicle in vehicles]
     reactions, trimming = kept_reactions(plan.situation, config, order), None
     if config.drivers > 0.0:
         fixed = (plan.requested.relaxed[..., 0] == 0.0).any(axis=0)
@@ -123,8 +121,8 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
             for n, (model, each) in enumerate(zip(models, routed, strict=True))
         ]
         trimming = trimming_of(plan.situation, config.leave_out, fixed)
-    model = CandidateModel(tuple(models), warp, reactions, trimming)
-    return BuiltModel(with_lights(model, plan), tuple(notes))
+    candidates = CandidateModel(tuple(models), warp, reactions, trimming)
+    return BuiltModel(with_lights(candidates, plan), tuple(notes))
 
 
 def kept_reactions(
@@ -157,17 +155,10 @@ def _route_vehicles(plan: Plan, config: SamplingConfig) -> tuple[list[RoutedVehi
     return [route_vehicle(n, plan, times, waits, config) for n in vehicles], waits
 
 
-class _NotedClock(NamedTuple):
-    """A clock with the notes on it."""
-
-    clock: Clock
-    notes: list[Note]
-
-
 def _nominal_clock(
     routed: Sequence[RoutedVehicle], grid: Floats, config: SamplingConfig
-) -> _NotedClock:
-    """Return the nominal clock on template times (G,) [s], slowed before bends."""
+) -> tuple[Clock, list[Note]]:
+    """Return the nominal clock on template times (G,) [s], slowed before bends, and notes."""
     plain = clock_from_rate(grid, np.ones(len(grid)))
     slowdowns = []
     for vehicle in routed:
@@ -179,7 +170,7 @@ def _nominal_clock(
     clock = slowed_clock(grid, slowdowns, 1.0 + config.max_stretch)
     slowest = float(clock.rate.max())
     if slowest < 1.0 + _TUNING.noted_slowing:
-        return _NotedClock(plain, [])
+        return plain, []
     n, k = divmod(int(np.argmax(slowdowns)), len(grid))
     note = Note.of(
         NoteKind.SLOWED,
@@ -188,7 +179,7 @@ def _nominal_clock(
         time=grid[k],
         delay=clock.time[-1] - grid[-1],
     )
-    return _NotedClock(clock, [note])
+    return clock, [note]
 
 
 class _Stretch(NamedTuple):
@@ -218,24 +209,15 @@ def _feasible_stretch(
         if len(feasible) < len(means):
             failed = means
             continue
-        shift = _largest_shift(routed, feasible)
+        pairs = zip(routed, feasible, strict=True)
+        shift = max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
         if shift < least_shift - _TUNING.free_shift:
-            best, least_shift = _Stretch(stretched, feasible, _stretch_notes(stretch), ""), shift
+            percent = 100.0 * (stretch - 1.0)
+            notes = [Note.of(NoteKind.STRETCHED, percent=percent)] if percent > 0.0 else []
+            best, least_shift = _Stretch(stretched, feasible, notes, ""), shift
         if shift <= _TUNING.free_shift:
             break
     return best if best.means else best._replace(refusal=_refusal(routed, failed, clock))
-
-
-def _largest_shift(routed: Sequence[RoutedVehicle], means: Sequence[MeanSpeed]) -> float:
-    """Return the largest distance [m] of any vehicle from a changepoint when it is due."""
-    pairs = zip(routed, means, strict=True)
-    return max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
-
-
-def _stretch_notes(stretch: float) -> list[Note]:
-    """Return the note on a stretched clock, if it is stretched."""
-    percent = 100.0 * (stretch - 1.0)
-    return [Note.of(NoteKind.STRETCHED, percent=percent)] if percent > 0.0 else []
 
 
 def _refusal(
@@ -249,22 +231,14 @@ def _refusal(
     )
 
 
-class _NotedVehicle(NamedTuple):
-    """A vehicle's model with the notes on it."""
-
-    model: VehicleModel
-    notes: list[Note]
-
-
 def _vehicle_model(
     routed: RoutedVehicle,
     road: Road,
     mean: MeanSpeed,
     config: SamplingConfig,
-    *,
     shares_lane: bool,
-) -> _NotedVehicle:
-    """Return the model of a vehicle, without variation; `shares_lane`: with another one."""
+) -> tuple[VehicleModel, list[Note]]:
+    """Return a vehicle's model without variation, and notes; `shares_lane`: with another one."""
     label, path, notes = routed.vehicle.id, routed.path, []
     shift = routed.largest_shift(mean.coefficients)
     if shift > _TUNING.noted_shift:
@@ -290,7 +264,7 @@ def _vehicle_model(
         min(config.longitudinal_time, _TUNING.length_share * float(np.ptp(routed.times))),
     )
     root = lateral_covariance_root(path, room, config, routed.steering)
-    return _NotedVehicle(VehicleModel(routed.vehicle, path, root, room, speed), notes)
+    return VehicleModel(routed.vehicle, path, root, room, speed), notes
 
 
 def _variation(

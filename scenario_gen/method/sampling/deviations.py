@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from scipy.integrate import cumulative_trapezoid
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
 from scenario_gen.method.sampling.path import BasePath
-from scenario_gen.numerics import Bools, Floats, place, running_sum, unit
+from scenario_gen.numerics import Floats, place, unit, unit_left
 from scenario_gen.roads import along_lanes
 from scenario_gen.types import Road, Vehicle
 
@@ -109,8 +110,8 @@ class Steering:
         """
         dt = float(time[1] - time[0])
         limited = np.sqrt(np.square(speed) + np.square(_CORRECTIONS.slow_speed))
-        driven = _cumulative(speed, dt)
-        passed = _cumulative(speed / limited, dt)
+        driven = cumulative_trapezoid(speed, dx=dt, initial=0.0)
+        passed = cumulative_trapezoid(speed / limited, dx=dt, initial=0.0)
         width = 2 * round(0.5 * _CORRECTIONS.averaging / dt) + 1
         moving = speed[width : len(yaw) - width] > _CORRECTIONS.moving_speed
         inside = np.flatnonzero(moving) + width
@@ -142,11 +143,6 @@ class Steering:
         features = Features(float(ends[0]), float(ends[1]), self.sigma, self.length)
         at = np.interp(arc, self.driven, self.passed)
         return Regression(features, fixed).predict(at).factor
-
-
-def _cumulative(values: Floats, dt: float) -> Floats:
-    """Return the integral (T,) of values (T,) by the trapezoidal rule."""
-    return running_sum(0.5 * dt * (values[1:] + values[:-1]))
 
 
 def _robust_sigma(values: Floats) -> float:
@@ -200,7 +196,7 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     for step in np.arange(1, int(np.ceil(most / _LATERAL.room_step)) + 1) * _LATERAL.room_step:
         offset = 0.5 * vehicle.width + step
         for side in (offset, -offset):
-            free &= _all_drivable(road, place(path.node[:, None], flank, side))
+            free &= road.drivable_at(place(path.node[:, None], flank, side)).all(axis=1)
         room[free] = min(step, most)
     reach = 0
     if not path.stands:
@@ -209,11 +205,6 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     for _ in range(2):
         smooth = ndimage.uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
     return np.asarray(smooth)
-
-
-def _all_drivable(road: Road, points: Floats) -> Bools:
-    """Return whether all points of each row (G, P, 2) [m] are drivable (G,)."""
-    return np.asarray(road.drivable_at(points).all(axis=1))
 
 
 def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Floats:
@@ -237,11 +228,10 @@ def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Fl
     for end, sign in ((0, -1.0), (-1, 1.0)):
         yaw = path.node[end, 2]
         distance = np.arange(step, most[end] + half + step, step)
-        left = np.array([-np.sin(yaw), np.cos(yaw)])
         centre = path.node[end, :2] + sign * distance[:, None, None] * unit(yaw)
-        points = centre + side[:, None] * left
+        points = centre + side[:, None] * unit_left(yaw)
         poses = np.column_stack((points.reshape(-1, 2), np.full(points[..., 0].size, yaw)))
-        free = _all_drivable(road, points)
+        free = road.drivable_at(points).all(axis=1)
         free &= along_lanes(road, poses).reshape(len(points), -1).all(axis=1)
         clear = float(distance[-1]) if free.all() else step * int(np.argmin(free))
         metres[end] = min(max(clear - half - step, 0.0), most[end])

@@ -108,16 +108,16 @@ class ValidityFilter:
         min_distances: (N,) metres that each vehicle drives at least.
         min_duration: s that a scenario lasts at least.
         max_end_braking: (N,) m/s² that each vehicle brakes at most shortly before its record
-            ends without a leader; empty: there is no such limit.
+            ends without a leader.
     """
 
     check: CheckScenarios
     max_absent: int
     enough: float
     lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
-    min_distances: Floats = field(default_factory=lambda: np.zeros(0))
+    min_distances: Floats | float = 0.0
     min_duration: float = 0.0
-    max_end_braking: Floats = field(default_factory=lambda: np.zeros(0))
+    max_end_braking: Floats | float = math.inf
 
     @classmethod
     def of(cls, sampler: Sampler, check: CheckScenarios, enough: float) -> "ValidityFilter":
@@ -152,13 +152,11 @@ class ValidityFilter:
 
     def _unfit(self, scenario: Scenario) -> Cause | None:
         """Return why a scenario need not be checked."""
-        if self._is_short(scenario):
+        driven = (scenario.speed * scenario.is_present).sum(axis=1) * SAMPLE_PERIOD_S
+        if scenario.time[-1] < self.min_duration or (driven < self.min_distances).any():
             return Cause.TOO_SHORT
-        if len(self.max_end_braking):
-            braking = _strongest_braking(scenario, _ENDING_S)
-            if (braking > self.max_end_braking).any():
-                return Cause.LATE_BRAKING
-        return None
+        is_late = (_strongest_braking(scenario, _ENDING_S) > self.max_end_braking).any()
+        return Cause.LATE_BRAKING if is_late else None
 
     def _cause(self, verdict: Verdict) -> Cause | None:
         for violation in filter(self._decides, verdict.violations):
@@ -168,13 +166,6 @@ class ValidityFilter:
     def _decides(self, violation: Violation) -> bool:
         """Return whether a violation is a reason to refuse."""
         return violation.cause != Cause.REACTION or violation.vehicles not in self.lost
-
-    def _is_short(self, scenario: Scenario) -> bool:
-        """Whether a scenario is short, or a vehicle hardly drives in it."""
-        if float(scenario.time[-1]) < self.min_duration:
-            return True
-        driven = (scenario.speed * scenario.is_present).sum(axis=1) * SAMPLE_PERIOD_S
-        return len(self.min_distances) > 0 and bool((driven < self.min_distances).any())
 
     def kept(self, edges: Iterable[Reaction]) -> tuple[Reaction, ...]:
         """Return the reactions that candidates keep."""
@@ -191,12 +182,12 @@ class ValidityFilter:
     def pilot(
         self,
         sampler: Sampler,
-        minimum: int = 0,
+        rarity: Callable[[Scenario], float] | None,
         cancelled: Callable[[], bool] = lambda: False,
     ) -> Pilot:
         """Return the pilot of the first level with enough valid candidates, or of the best.
 
-        Where it has fewer than `minimum` valid candidates, five times as many are drawn.
+        With too few valid candidates for a bound of `rarity`, five times as many are drawn.
         """
         count = PILOT_CANDIDATES // BLOCK_CANDIDATES
         pilots: list[Pilot] = []
@@ -206,7 +197,7 @@ class ValidityFilter:
             if len(pilots[level].valid) >= self.enough * PILOT_CANDIDATES or cancelled():
                 break
         best = max(pilots, key=lambda pilot: len(pilot.valid))._replace(tried=len(pilots))
-        if len(best.valid) < minimum and not cancelled():
+        if rarity and len(best.valid) < MIN_RARITY_SCENARIOS and not cancelled():
             further = range(count, _LARGE_PILOT_FACTOR * count)
             best.candidates.extend(self.judged(sampler.block(best.level, k) for k in further))
         return best

@@ -11,7 +11,6 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.filters import (
     CheckScenarios,
     Filters,
-    MIN_RARITY_SCENARIOS,
     PILOT_CANDIDATES,
     RarityFilter,
     ValidityFilter,
@@ -57,8 +56,7 @@ class NaturalScenarios:
         sampler = Sampler(built.model, seed, plan.road.frame_id)
         validity = ValidityFilter.of(sampler, check, enough_share(config))
         rarity = None if measures is None else measures.rarity
-        minimum = 0 if rarity is None else MIN_RARITY_SCENARIOS
-        pilot = validity.pilot(sampler, minimum)
+        pilot = validity.pilot(sampler, rarity)
         if not pilot.valid:
             raise RefusedError(
                 f"none of {PILOT_CANDIDATES * len(LEVELS)} candidates is valid, "

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from scenario_gen.method.sampling.time_warp import ClockSamples
-from scenario_gen.numerics import arc_lengths, Floats, frozen, Ints, running_sum
+from scenario_gen.numerics import arc_lengths, Floats, frozen, Ints, running_sum, unit
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.loops import copy_to
 from scenario_gen.types import Route
@@ -57,8 +57,8 @@ class BasePath:
         if len(points) == 1:
             return cls(frozen(points), 0.0, frozen(np.zeros(len(route.anchor))))
         chord = arc_lengths(points[:, :2])
-        tangents = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in points[[0, -1], 2]]
-        curve = CubicSpline(chord, points[:, :2], bc_type=((1, tangents[0]), (1, tangents[1])))
+        start, end = unit(points[[0, -1], 2])
+        curve = CubicSpline(chord, points[:, :2], bc_type=((1, start), (1, end)))
         fine = np.linspace(chord[:-1], chord[1:], _FINE_STEPS, endpoint=False).T.ravel()
         fine = np.append(fine, chord[-1])
         middle = 0.5 * (fine[:-1] + fine[1:])

@@ -36,6 +36,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from scenario_gen.method.sampling.gp import squared_exponential
 from scenario_gen.method.sampling.numbers import ModelNumbers
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.method.sampling.variation import VehicleClock
@@ -245,9 +246,9 @@ class _Context:
         gap = _RESIDUALS.standstill_gap + edge.headway[1] * speed
         metres = edge.residual * np.minimum(gap / np.median(gap), 1.0)
         seconds = metres / np.maximum(speed, _RESIDUALS.min_following_speed)
-        slow = _correlation(at, _RESIDUALS.slow_length)
+        slow = squared_exponential(at, at, 1.0, _RESIDUALS.slow_length)
         slow += np.square(_RESIDUALS.rough_share) * np.eye(count)
-        quick = np.square(_RESIDUALS.quick_sigma) * _correlation(at, _RESIDUALS.quick_length)
+        quick = squared_exponential(at, at, _RESIDUALS.quick_sigma, _RESIDUALS.quick_length)
 
         seconds_rows = {who: self._lateness(who, at), whom: -self._lateness(whom, before)}
         yield _Equations(seconds_rows, seconds[:, None] * seconds * slow)
@@ -284,11 +285,6 @@ class _Context:
 def _variance(sigma: float) -> Floats:
     """Return the (1, 1) covariance of one residual with this standard deviation."""
     return np.array([[np.square(sigma)]])
-
-
-def _correlation(at: Floats, length: float) -> Floats:
-    """Return the (q, q) correlation, of a length [s], of values at times (q,) [s]."""
-    return np.exp(-0.5 * np.square((at[:, None] - at) / length))
 
 
 def _within(model: VehicleModel, at: Floats) -> Floats:

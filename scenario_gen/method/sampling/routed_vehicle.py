@@ -235,7 +235,7 @@ def route_vehicle(
     encounter, route = plan.encounter, plan.routes[n]
     vehicle, path = encounter.vehicles[n], BasePath.of(route)
     limits = plan.limits.of(vehicle.type).planned
-    span = _presence(encounter, n)
+    span = encounter.present_slice(n)
     time, speed = encounter.time[span], encounter.speed[n, span]
     driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
     scale = min(path.length / driven, _TUNING.max_scale) if driven > 1e-3 else 1.0
@@ -286,12 +286,6 @@ def route_vehicle(
     )
 
 
-def _presence(encounter: Encounter, n: int) -> slice:
-    """Return the samples at which vehicle n is present."""
-    first, last = encounter.present[n].tolist()
-    return slice(first, last + 1)
-
-
 def _unless(zero: Bools, speeds: Sequence[float] | Floats) -> tuple[float, float]:
     """Return two end speeds [m/s], 0 where `zero` (2,) is true."""
     start, end = np.where(zero, 0.0, speeds).tolist()
@@ -318,7 +312,7 @@ def sharpest_curvature(path: BasePath) -> Floats:
 
 def _largest_lateral(encounter: Encounter, track: Track, n: int) -> float:
     """Return the largest lateral acceleration [m/s²] of vehicle n, averaged over half a second."""
-    span = _presence(encounter, n)
+    span = encounter.present_slice(n)
     width = 2 * round(0.5 * _TUNING.averaging / encounter.dt) + 1
     lateral = np.gradient(track.poses[span, 2], encounter.dt) * encounter.speed[n, span]
     return float(np.abs(ndimage.uniform_filter1d(lateral, width, mode="nearest")).max())

@@ -178,15 +178,11 @@ class Proposal:
         return np.where(natural[:, None], z, z + step)
 
     def density_ratio(self, z: Floats) -> Floats:
-        """Return q(z) / φ(z) (S,) at samples z (S, d)."""
+        """Return q(z) / φ(z) (S,) at samples z (S, d), at least NATURAL_SHARE."""
         u = z @ self.basis.T
         power = 0.5 * (np.square(u) - np.square((u - self.mean) / self.sigma)).sum(axis=1)
         shifted = np.exp(np.minimum(power, _MAX_EXPONENT)) / np.prod(self.sigma)
         return np.asarray(NATURAL_SHARE + (1.0 - NATURAL_SHARE) * shifted)
-
-    def weights(self, z: Floats) -> Floats:
-        """Return the importance weights φ(z) / q(z) (S,), at most 1 / NATURAL_SHARE."""
-        return np.asarray(1.0 / self.density_ratio(z))
 
 
 def directions(z: Floats, guides: Floats) -> Floats:
@@ -367,7 +363,7 @@ class Sampler:
             return 1.0
         number, row = divmod(candidate, BLOCK_CANDIDATES)
         numbers = self.numbers(level, number)[row : row + 1]
-        return float(self.proposal.weights(numbers)[0])
+        return 1.0 / float(self.proposal.density_ratio(numbers)[0])
 
     def numbers(self, level: int, number: int) -> Floats:
         """Return the numbers (S, size) of a block, those of a proposal transformed by it."""

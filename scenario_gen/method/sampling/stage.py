@@ -15,14 +15,12 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.sampling.build_model import build_model, kept_reactions
-from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.cross_entropy import find_proposal, STAGE_BLOCKS_COUNT
 from scenario_gen.method.sampling.filters import (
     Candidate,
     CheckScenarios,
     Filters,
-    MIN_RARITY_SCENARIOS,
     Pilot,
     RarityFilter,
     ValidityFilter,
@@ -107,13 +105,13 @@ def draw_scenarios(
         drawn = ScenarioSet(count, (), 1, refused, (note,), slot)
     else:
         target = TargetSet.of(plan.situation, request, measures)
-        sampler = _sampler(built.model, plan, request, seed, target, measures)
+        ego = request.ego_of(plan.encounter)
+        sampler = Sampler(built.model, seed, plan.road.frame_id, ego)
         validity = ValidityFilter.of(sampler, check, enough_share(config, request))
         pilot, rarity = None, RarityFilter()
         if target is None:  # who asks for a critical range asks for what is rare
             law = None if measures is None else measures.rarity
-            minimum = MIN_RARITY_SCENARIOS if law is not None else 0
-            pilot = validity.pilot(sampler, minimum, callbacks.cancelled)
+            pilot = validity.pilot(sampler, law, callbacks.cancelled)
             rarity = RarityFilter.of(law, pilot.valid)
         filters = Filters(validity, target, rarity)
         kept = validity.kept(built.model.reactions.edges)
@@ -128,34 +126,14 @@ def draw_scenarios(
         drawn = ScenarioSet(
             count, tuple(run.scenarios), run.candidates, run.refused, notes, slot, reached, kept
         )
-    if request.moves and not callbacks.cancelled():
-        _refuse_empty(drawn)
-    return drawn
-
-
-def _refuse_empty(drawn: ScenarioSet) -> None:
-    """Refuse a set without scenarios."""
-    if not drawn.scenarios:
+    if request.moves and not drawn.scenarios and not callbacks.cancelled():
         causes = (f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
         reasons = "; ".join((", ".join(causes), *map(str, drawn.adaptations)))
         raise RefusedError(
             f"none of {drawn.candidates} candidate(s) with the requested states is valid "
             f"({reasons})"
         )
-
-
-def _sampler(
-    model: CandidateModel,
-    plan: Plan,
-    request: Request,
-    seed: int,
-    target: TargetSet | None,
-    measures: Measures | None,
-) -> Sampler:
-    """Return the sampler of a request, before it is known which reactions scenarios keep."""
-    label = label_of(plan.situation, request, target, measures)
-    ego = request.ego_of(plan.encounter)
-    return Sampler(model, seed, plan.road.frame_id, ego, label=label)
+    return drawn
 
 
 def enough_share(config: SamplingConfig, request: Request = Request()) -> float:
@@ -323,8 +301,8 @@ def label_of(
     request: Request,
     target: TargetSet | None,
     measures: Measures | None,
-    reactions: Sequence[Reaction] = (),
-    lost: Iterable[tuple[int, ...]] = (),
+    reactions: Sequence[Reaction],
+    lost: Iterable[tuple[int, ...]],
 ) -> Label:
     """Return the function that gives a scenario's facts.
 

@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage, special
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
-from scenario_gen.numerics import Floats, Ints, running_sum
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, named, OUT2
 from scenario_gen.types import Encounter
 
@@ -89,9 +90,7 @@ class TimeWarp:
     the rest follows given the end.
     """
 
-    def __init__(
-        self, nominal: Clock, config: SamplingConfig, least_share: Floats | None = None
-    ) -> None:
+    def __init__(self, nominal: Clock, config: SamplingConfig, least_share: Floats) -> None:
         """Prepare the process.
 
         Args:
@@ -101,8 +100,7 @@ class TimeWarp:
         """
         self.nominal = nominal
         grid = nominal.grid
-        default = np.full(len(grid), MIN_RATE_RATIO)
-        self._least_share = default if least_share is None else least_share
+        self._least_share = least_share
         duration = float(nominal.time[-1]) / SAMPLE_PERIOD_S
         tolerance = config.duration_tolerance
         self._shortest = np.ceil(duration * (1.0 - tolerance) - _ROUNDING_STEPS)
@@ -263,5 +261,4 @@ def slowed_clock(grid: Floats, slowdowns: Sequence[Floats], max_duration: float)
 def clock_from_rate(grid: Floats, rate: Floats) -> Clock:
     """Return the clock with these rates (G,) at template times (G,) [s], cubic in between."""
     step = float(grid[1] - grid[0])
-    time = running_sum(0.5 * step * (rate[1:] + rate[:-1]))
-    return Clock(grid, time, rate)
+    return Clock(grid, cumulative_trapezoid(rate, dx=step, initial=0.0), rate)

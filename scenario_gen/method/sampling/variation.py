@@ -96,9 +96,9 @@ def relaxed_states(
     seconds = slowest * _max_time_shift(situation, config)
     steps = np.maximum(np.ceil(seconds / encounter.dt).astype(np.int64), 1).tolist()
     across = config.freedom * config.place_sigma
-    for n, (first, last) in enumerate(encounter.present.tolist()):
-        recorded = encounter.speed[n, first : last + 1]
-        sigma = config.of(encounter.vehicles[n].kind).end_speed_sigma
+    for n, vehicle in enumerate(encounter.vehicles):
+        recorded = encounter.speed[n, encounter.present_slice(n)]
+        sigma = config.of(vehicle.kind).end_speed_sigma
         faster = config.freedom * sigma
         near = (recorded[: steps[0] + 1], recorded[-steps[1] - 1 :])
         for end, states in enumerate((requested.start, requested.end)):

@@ -223,8 +223,8 @@ class SpeedModel:
         """
         longer, faster = _spread_length(spline)
         strength = Strength.of(spline, mean.coefficients, longer)
-        process = _process(spline, speed_residual(spline, mean, time, speed), sigma, length)
-        factor = _conditioned(spline, process)
+        deviation = speed - spline.design(time) @ mean.coefficients
+        factor = _conditioned(spline, _process(spline, time, deviation, sigma, length))
         free, m = ~fixed_coefficients(spline, (0.0, 0.0))[0], len(spline.stations)
         bounds, motion = mean.bounds, mean.motion
         limits = [(bounds.deceleration, bounds.acceleration), (bounds.jerk, bounds.jerk)]
@@ -337,24 +337,17 @@ def kernel_root(time: Floats, amplitude: Floats, length: float) -> Floats:
     return np.asarray(amplitude[:, None] * covariance_root((1.0 - x) * np.exp(-0.5 * x)))
 
 
-def speed_residual(
-    spline: SpeedSpline, mean: MeanSpeed, time: Floats, speed: Floats
-) -> tuple[Floats, Floats]:
-    """Return times (k,) [s] and deviations (k,) [m/s] of the template's speed from the mean."""
-    inside = (time >= spline.breaks[0]) & (time <= spline.breaks[-1])
-    at = time[inside]
-    return at, speed[inside] - spline.design(at) @ mean.coefficients
-
-
 def _process(
-    spline: SpeedSpline, residual: tuple[Floats, Floats], sigma: float, length: float
+    spline: SpeedSpline, time: Floats, deviation: Floats, sigma: float, length: float
 ) -> Floats:
-    """Return the square root (n, r) of the covariance of the coefficients, without conditions."""
+    """Return the square root (n, r) of the covariance of the coefficients, without conditions.
+
+    `deviation` (T,) [m/s] is that of the template's speed from the mean, at `time` (T,) [s].
+    """
     at = spline.middle
     if sigma == 0.0:
         return np.zeros((len(at), 0))
     parts = [kernel_root(at, np.full(len(at), sigma / length), length)]
-    time, deviation = residual
     strength = float(np.sqrt(np.square(deviation).mean()))
     if strength > 1e-3:
         dt = float(time[1] - time[0])
