@@ -343,20 +343,17 @@ class Namespace(RecordedScenarios):
         return None, ()
 
 
-def load(
-    path: Path | str, namespace: str = "", config: BagConfig = BagConfig()
-) -> GenerationResult:
+def load(path: Path | str, namespace: str = "") -> GenerationResult:
     """Return a result from a bag: template and scenarios of its last request, not evaluated.
 
     Args:
         path: the bag of `GenerationResult.save` or `scenario-gen generate`.
         namespace: "" or e.g. "/case_2".
-        config: bounds of reading it.
 
     Raises:
         InputError: the bag cannot be read, or the namespace or a scenario is missing.
     """
-    return result_in(read_recording(Path(path), config), namespace)
+    return result_in(read_recording(Path(path)), namespace)
 
 
 def result_in(recording: Recording, namespace: str = "") -> GenerationResult:

@@ -126,19 +126,19 @@ def _rows_of(record: Any, number: int) -> list[Row]:
     data = record["payload"]["data"]
     core = (data.get("value", {}).get("BasicSafetyMessage") or data)["coreData"]
     seconds = _stamp(record, core.get("secMark"))
-    if "lat" not in core:
+    if "lat" in core:
+        speed = float(core["speed"])
+        heading = float(core["heading"])
+        row = {
+            "lat": float(core["lat"]) * 1e-7,
+            "lon": float(core["long"]) * 1e-7,
+            "speed": None if speed == _UNKNOWN_SPEED_CODE else speed * 0.02,  # m/s
+            "heading": None if heading == _UNKNOWN_HEADING_CODE else heading * 0.0125,  # degrees
+        }
+    else:
         position = core["position"]
         row = {"lat": position["latitude"], "lon": position["longitude"]}
         row |= {"speed": core.get("speed"), "heading": core.get("heading")}
-        return [_row(core, seconds, row)]
-    speed = float(core["speed"])
-    heading = float(core["heading"])
-    row = {
-        "lat": float(core["lat"]) * 1e-7,
-        "lon": float(core["long"]) * 1e-7,
-        "speed": None if speed == _UNKNOWN_SPEED_CODE else speed * 0.02,  # m/s
-        "heading": None if heading == _UNKNOWN_HEADING_CODE else heading * 0.0125,  # degrees
-    }
     return [_row(core, seconds, row)]
 
 
@@ -168,15 +168,10 @@ def _row(core: Any, seconds: float, state: Row) -> Row:
     return row
 
 
-def _stamp(record: Any, milliseconds: Any) -> float:
-    """Return the stamp [s since 1970] of a message, with its milliseconds of the minute."""
-    metadata = record["metadata"]
-    date = metadata.get("recordGeneratedAt") or metadata["odeReceivedAt"]
-    return _seconds(str(date), milliseconds)
-
-
-def _seconds(generated: str, second_mark: Any) -> float:
+def _stamp(record: Any, second_mark: Any) -> float:
     """Return the stamp [s since 1970] by a record's date and the milliseconds of the minute."""
+    metadata = record["metadata"]
+    generated = str(metadata.get("recordGeneratedAt") or metadata["odeReceivedAt"])
     text = re.sub(r"\s*\[.*", "", generated[:MAX_DATE_LENGTH_COUNT])
     date = pd.to_datetime(text, utc=True, errors="coerce")
     if pd.isna(date):

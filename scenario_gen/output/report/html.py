@@ -50,9 +50,7 @@ def render_page(
         return _asset(name)
 
     environment = _environment(asset)
-    environment.filters["estimate"] = lambda value, unit="", bounds=True, cap=None: formatted(
-        value, unit, bounds=bounds, cap=cap
-    )
+    environment.filters["estimate"] = formatted
     texts = [*libraries, *map(asset, scripts)]
     return environment.get_template(template).render(
         css=Markup(asset("report.css")),

@@ -170,7 +170,10 @@ def _evaluate(
             violations += verdict.violations
             scenarios.append(scenario)
             skipped.update(checker.not_applicable)
-            skipped.update(_missing_messages(namespace, entry))
+            if not namespace.entries:
+                skipped[f"sha256: there is no entry on {INFO}"] += 1
+            if entry is not None and namespace.without_witness(entry):
+                skipped[f"the ego: its reference drive is not on {WITNESS}"] += 1
         verdicts.append(Verdict(tuple(violations)))
         tick()
     notes = [Note.of(NoteKind.TEXT, text=text) for text in namespace.missing]
@@ -315,14 +318,6 @@ def _alterations(namespace: Namespace, k: int, entry: ScenarioEntry | None) -> I
     if namespace.without_witness(entry) and namespace.strange_witnesses:
         message = f"the ego's reference drive is not what was published for scenario {entry.index}"
         yield Violation(Cause.ALTERED, 0.0, (), message)
-
-
-def _missing_messages(namespace: Namespace, entry: ScenarioEntry | None) -> Iterator[str]:
-    """Yield the checks that the bag lacks messages for."""
-    if not namespace.entries:
-        yield f"sha256: there is no entry on {INFO}"
-    if entry is not None and namespace.without_witness(entry):
-        yield f"the ego: its reference drive is not on {WITNESS}"
 
 
 def _ego_slot(scenario: Scenario) -> EgoSlot | None:
