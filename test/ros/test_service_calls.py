@@ -19,6 +19,8 @@ import pytest
 from support.suite_processes import Processes, RESOURCES
 import yaml
 
+from msg_conventions.diagnostics import Level
+
 pytestmark = pytest.mark.dds
 ROOT = Path(__file__).resolve().parents[2]
 CALLS = (ROOT / "examples" / "service_calls.sh").read_text(encoding="utf-8")
@@ -182,6 +184,8 @@ def test_service_calls_are_answered(suite, client):
                 ]
     assert wrong == []
     assert len(later) == 1
+    errors = {s.name for s in client.statuses() if s.level is Level.ERROR}
+    assert {"/road_server: load_map", "/planner: get_plan"} <= errors
     assert [path.is_dir() for path in suite.folder.glob("bag_*")] == [True]
     lines = [line for line in suite.log("gp_sampler").splitlines() if "request large:" in line]
     assert len(lines) < 10 + time.monotonic() - begun, (
