@@ -19,12 +19,7 @@ from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.situation import conflict_of
-from scenario_gen.types import (
-    Dynamics,
-    Facts,
-    NamedReaction,
-    YIELD,
-)
+from scenario_gen.types import Dynamics, Facts, NamedReaction, YIELD
 
 EXAMPLES = 10_000 if LONG else 25
 FAR = Pose(1e4, 1e4, 0.0, 0.0)
@@ -121,10 +116,8 @@ def test_body_keeps_limits_and_drives_arcs():
     centre = np.hypot(state.x, state.y - 10.0)
     assert centre == pytest.approx(10.0, abs=1e-9) and state.yaw == pytest.approx(5.0 * 20.0 * 0.1)
     fast = move(state, Command(100.0, 9.0), config, limits).state
-    assert (
-        fast.acceleration == pytest.approx(limits.max_acceleration)
-        and fast.curvature == limits.max_curvature
-    )
+    assert fast.acceleration == pytest.approx(limits.max_acceleration)
+    assert fast.curvature == limits.max_curvature
     state = EgoState(0.0, 0.0, 0.0, 0.45)
     stopped = move(state, Command(-9.0, 0.0), config, limits).state
     assert stopped.speed == 0.0 and stopped.x == pytest.approx(0.45**2 / 18.0)
@@ -187,6 +180,5 @@ def test_type_limits_bind_the_ego():
     config = assigned(ClosedLoopConfig(), "limits.car.max_acceleration=1.2")
     loop = ClosedLoop(crossing(), 0, config=config)
     state = loop.step(loop.start(), Command(9.0, 0.0))
-    assert (
-        state.ego.acceleration == pytest.approx(1.2) and loop.task().limits.max_acceleration == 1.2
-    )
+    assert state.ego.acceleration == pytest.approx(1.2)
+    assert loop.task().limits.max_acceleration == 1.2

@@ -82,12 +82,10 @@ def test_worse_planner_is_found_and_named():
     before = np.arange(300) % 10 == 0
     now = before | (np.arange(300) % 10 == 1)
     found = compared(driven(now, 13), ClosedLoopConfig(), earlier(before))
-    assert (
-        found.worse
-        and found.difference.value == pytest.approx(0.1)
-        and len(found.now_fail) == 30
-        and not found.now_pass
-    )
+    assert found.worse
+    assert found.difference.value == pytest.approx(0.1)
+    assert len(found.now_fail) == 30
+    assert not found.now_pass
     better = compared(driven(before, 13), ClosedLoopConfig(), earlier(now))
     assert not better.worse and better.difference.high < 0.0 and len(better.now_pass) == 30
 
@@ -104,10 +102,8 @@ def test_figures_are_compared_per_drive():
                 outcome.verdict.min_ttc = known[k] + ttc[1, k] + shift
             compare = compared(now, ClosedLoopConfig(), earlier(failed, min_ttc=known + ttc[0]))
             assert list(compare.figures) == ["min_ttc"] and compare.difference.value == 0.0
-            alarms, found = (
-                alarms + (compare.worse and not shift),
-                found + (compare.worse and shift < 0.0),
-            )
+            alarms = alarms + (compare.worse and not shift)
+            found = found + (compare.worse and shift < 0.0)
     assert alarms <= 7 and found >= 180  # more have a probability of 0.01 at 1.7 %
     mean = compare.document()["figures"]["min_ttc"]
     assert f"mean min_ttc {mean['value']:+.2f} s" in compare.sentence() and mean["high"] < 0.0

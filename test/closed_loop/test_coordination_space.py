@@ -37,10 +37,8 @@ class Slower:
 
 
 def generated(encounter, count):
-    road, segmentation = (
-        build_road("corridor", encounter, CONFIG.road),
-        segment(encounter, CONFIG.segmentation, 1),
-    )
+    road = build_road("corridor", encounter, CONFIG.road)
+    segmentation = segment(encounter, CONFIG.segmentation, 1)
     return (
         Chain(Situation.of(encounter), segmentation, road, CONFIG, count=count, seed=1)
         .run()

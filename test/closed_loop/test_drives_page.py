@@ -45,11 +45,9 @@ def test_drives_are_sorted_chosen_and_played(browser, file):
     scrolled = tab.page.evaluate("scrollY")
     tab.page.keyboard.press("Space")
     assert tab.page.locator("#play").inner_text() == "❚❚", "it plays"
-    assert (
-        tab.page.evaluate("scrollY") == scrolled
-        and tab.troubles == []
-        and tab.asked() == [file.as_uri()]
-    )
+    assert tab.page.evaluate("scrollY") == scrolled
+    assert tab.troubles == []
+    assert tab.asked() == [file.as_uri()]
     tab.page.close()
 
 
@@ -74,8 +72,6 @@ def test_search_page_without_failure_works(browser, tmp_path):
     file = tmp_path / "search.html"
     file.write_text(page)
     tab = Tab(browser, file, DESKTOP)
-    assert (
-        tab.troubles == []
-        and "a failure is a collision that is its fault" in tab.page.locator("header").inner_text()
-    )
+    assert tab.troubles == []
+    assert "a failure is a collision that is its fault" in tab.page.locator("header").inner_text()
     tab.page.close()

@@ -35,11 +35,9 @@ def drive(env, seed):
 @pytest.mark.filterwarnings("error::UserWarning")
 def test_gymnasium_finds_nothing_wrong():
     env = gymnasium.make(ID, trials=TRIALS)
-    assert (
-        env.spec.id == ID
-        and np.isfinite(env.observation_space.low).all()
-        and np.isfinite(env.observation_space.high).all()
-    )
+    assert env.spec.id == ID
+    assert np.isfinite(env.observation_space.low).all()
+    assert np.isfinite(env.observation_space.high).all()
     check_env(env.unwrapped)
 
 
@@ -63,11 +61,9 @@ def test_gymnasium_makes_vectors_of_it():
 def test_same_seed_gives_same_drive():
     env = DriveEnv(TRIALS)
     (one, verdict), (other, again) = (drive(env, 3) for _ in range(2))
-    assert (
-        (one == other).all()
-        and verdict == again
-        and all(env.observation_space.contains(row) for row in one)
-    )
+    assert (one == other).all()
+    assert verdict == again
+    assert all(env.observation_space.contains(row) for row in one)
     assert env.reset(options={"index": 2})[1]["name"] == "5"
     with pytest.raises(InputError, match="no scenario with index 3"):
         env.reset(options={"index": 3})

@@ -85,11 +85,9 @@ def test_pedestrian_beside_parked_car_waits():
     loop = ClosedLoop(scene(waiting_car(7.0, 16.0), walker(-9.0), parked), 0)
     drive = loop.drive(KEEPS, lambda state: state.step >= 150)
     y = drive.motion.position[1, :, 1]
-    assert (
-        judge(loop, drive).collision is None
-        and (np.abs(y[drive.motion.speed[1] < 0.5]) > LANE + 0.5).all()
-        and y[-1] > 2.0
-    )
+    assert judge(loop, drive).collision is None
+    assert (np.abs(y[drive.motion.speed[1] < 0.5]) > LANE + 0.5).all()
+    assert y[-1] > 2.0
 
 
 def test_pedestrian_precedes_stopping_car():
@@ -122,10 +120,8 @@ def test_pedestrian_waits_until_patience_ends():
     loop = ClosedLoop(scene(car, walker(-10.0)), 0, config=ClosedLoopConfig(patience=4.0))
     drive = loop.drive(Accelerates(lambda seen: -4.0), lambda state: state.step >= 230)
     stands = drive.motion.speed[1] < 0.05
-    assert (
-        0.1 * stands.sum() == pytest.approx(loop.traits.patience[1], abs=1.0)
-        and drive.motion.position[1, -1, 1] > 3.0
-    )
+    assert 0.1 * stands.sum() == pytest.approx(loop.traits.patience[1], abs=1.0)
+    assert drive.motion.position[1, -1, 1] > 3.0
     assert (drive.motion.position[1, stands, 1] < -LANE - 0.5).all()
 
 

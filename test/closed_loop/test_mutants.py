@@ -75,9 +75,8 @@ def test_mutants_are_caught_or_survive():
     assert all(outcome.verdict.passed for outcome in outcomes)
     score = mutation_score(trials, lambda: IdmFollower(speed=12.0), outcomes)
     results = {each.fault: each for each in score.results}
-    assert list(results) == list(MUTANTS) and score.caught == len(MUTANTS) - sum(
-        "survives" in str(each) for each in score.results
-    )
+    assert list(results) == list(MUTANTS)
+    assert score.caught == len(MUTANTS) - sum("survives" in str(each) for each in score.results)
     assert results["ignores all others"].killed_by[0] == "follower"
     assert "never exercise" in str(results["ignores bicycles"])
     assert set(score.smallest_set()) <= {"follower", "crossing"}

@@ -29,9 +29,8 @@ def test_copies_move_all_vehicles_alike():
             for each in zip("abcde", scenarios, [0, 0, 0, 0, 1], [None] * 5, "xxxyx", strict=True)
         ]
     )
-    assert [each.copy_of for each in found] == ["", "a", "", "", ""] and len(
-        {each.digest for each in found}
-    ) == 5
+    assert [each.copy_of for each in found] == ["", "a", "", "", ""]
+    assert len({each.digest for each in found}) == 5
 
 
 @pytest.mark.parametrize(("shift_m", "original"), [(0.098, "a"), (0.102, "")])
@@ -68,9 +67,8 @@ def test_copies_have_interval_of_one_each():
     )
     assert sum(bool(one.origin.copy_of) for one in outcomes) == 6
     goals = rates(outcomes)["off_road"]
-    assert (goals.count, goals.of) == (0, 12) and goals.share.high == pytest.approx(
-        wilson(0, 6, 0.95).high
-    )
+    assert (goals.count, goals.of) == (0, 12)
+    assert goals.share.high == pytest.approx(wilson(0, 6, 0.95).high)
 
 
 @pytest.mark.parametrize(

@@ -112,9 +112,8 @@ def test_vehicle_waiting_for_nobody_is_refused(tmp_path):
 
 def test_without_an_ego_it_is_refused(tmp_path):
     done = generated(tmp_path / "none", str(bundled("b")), "--road", "t_intersection")
-    assert done.exit_code != 0 and "name the vehicle that the planner replaces" in str(
-        done.exception
-    )
+    assert done.exit_code != 0
+    assert "name the vehicle that the planner replaces" in str(done.exception)
 
 
 def test_committed_vehicle_does_not_rescue_ego():
@@ -128,11 +127,9 @@ def test_committed_vehicle_does_not_rescue_ego():
             config=ClosedLoopConfig(policy=policy),
         )
         verdicts[policy] = judge(loop, loop.drive(ConstantSpeed(speed=6.2)))
-    assert (
-        verdicts["reactive"].collision is None
-        and verdicts["committed"].at_fault
-        and verdicts["replay"].at_fault
-    )
+    assert verdicts["reactive"].collision is None
+    assert verdicts["committed"].at_fault
+    assert verdicts["replay"].at_fault
     assert (
         verdicts["committed"].collision.speed < verdicts["replay"].collision.speed - 0.5
     )  # it brakes, too late

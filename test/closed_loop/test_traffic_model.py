@@ -112,10 +112,8 @@ def test_jerk_is_bounded_unless_forced(seed, step, jerk, vehicles):
     """On certified motions of one speed, which have no jerk of their own; whatever the ego does."""
     scenario = replace(following(12.0, 10.0, vehicles) if seed % 2 else crossing(), seed=seed)
     ego = seed % len(scenario.vehicles)
-    loop, planner = (
-        ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk)),
-        Anything(seed),
-    )
+    loop = ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk))
+    planner = Anything(seed)
     planner.reset(loop.task())
     drive = [loop.start()]
     for _ in range(int(12 / step)):

@@ -58,85 +58,64 @@ def go_on(_):
 
 def test_moving_vehicle_runs_into_standing_one():
     """Lengths are 4.0 and 4.5 m: at 10 m/s the front reaches the tail after (40 - 4.25) / 10 s."""
-    verdict, drive = verdict_of(
-        [straight(0, 0, 0, 10.0), straight(40.0, 0, 0, 0.0)], lambda _: Command(0.0, 0.0)
-    )
-    assert (
-        verdict.collision.time
-        == pytest.approx(3.575, abs=1e-4)
-        == pytest.approx(seen_at(drive), abs=2e-3)
-    )
-    assert verdict.collision.ran is Runner.EGO and verdict.collision.speed == pytest.approx(10.0)
-    assert (
-        verdict.collision.vehicle == "v1"
-        and not verdict.passed
-        and "the ego ran into v1 at 3.57 s" in verdict.sentence()
-    )
-    verdict, _ = verdict_of(
-        [straight(40.0, 0, 0, 0.0), straight(0, 0, 0, 10.0)], lambda _: Command(0.0, 0.0)
-    )
-    assert verdict.collision.ran is Runner.OTHER and verdict.collision.time == pytest.approx(
-        3.575, abs=1e-4
-    )
-    verdict, _ = verdict_of(
-        [straight(0, 0, 0, 10.0), straight(60.0, 0, np.pi, 10.0)], lambda _: Command(0.0, 0.0)
-    )
-    assert verdict.collision.ran is Runner.BOTH and verdict.collision.speed == pytest.approx(20.0)
+    comes, stands = straight(0, 0, 0, 10.0), straight(40.0, 0, 0, 0.0)
+    verdict, drive = verdict_of([comes, stands], go_on)
+    assert not verdict.passed and "the ego ran into v1 at 3.57 s" in verdict.sentence()
+    collision = verdict.collision
+    assert (collision.ran, collision.vehicle) == (Runner.EGO, "v1")
+    assert collision.speed == pytest.approx(10.0)
+    assert collision.time == pytest.approx(3.575, abs=1e-4)
+    assert collision.time == pytest.approx(seen_at(drive), abs=2e-3)
+    collision = verdict_of([stands, comes], go_on)[0].collision
+    assert collision.ran is Runner.OTHER
+    assert collision.time == pytest.approx(3.575, abs=1e-4)
+    collision = verdict_of([comes, straight(60.0, 0, np.pi, 10.0)], go_on)[0].collision
+    assert collision.ran is Runner.BOTH and collision.speed == pytest.approx(20.0)
 
 
 def test_contact_between_instants_is_found():
     """The ego passes through the other's corner in less than a step: at no instant do they overlap."""
     side = straight(0.0, 30.0, -np.pi / 2, 0.0)  # stands across the way, its end at y = 27.75
-    verdict, drive = verdict_of(
-        [straight(-40.0, 27.75 - 0.95 + 0.06, 0, 40.0), side],
-        lambda seen: Command(0.0, 0.0),
-        step=0.5,
-        goal_width=0.1,
-    )
-    assert verdict.collision is not None and seen_at(drive) == pytest.approx(
-        verdict.collision.time, abs=2e-3
-    )
+    passes = straight(-40.0, 27.75 - 0.95 + 0.06, 0, 40.0)
+    verdict, drive = verdict_of([passes, side], go_on, step=0.5, goal_width=0.1)
+    assert seen_at(drive) == pytest.approx(verdict.collision.time, abs=2e-3)
+
+
+def strip(half_width):
+    """A road along the x axis, so many metres [m] to either side of it."""
+    drivable = np.zeros((100, 1000), dtype=np.bool_)
+    drivable[np.abs(0.2 * (np.arange(100) + 0.5) - 10.0) < half_width] = True
+    no = np.empty((0, 3))
+    return Road("strip", drivable, 0.2, np.array((-20.0, -10.0)), no, no)
+
+
+BESIDE = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]  # too far to meet
 
 
 def test_off_road_goal_and_progress():
-    drivable = np.zeros((100, 1000), dtype=np.bool_)
-    drivable[40:60] = True  # y from -2 to 2 m
-    road = Road(
-        "strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
-    )
-    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
-    verdict, _ = verdict_of(motions, go_on, road=road)
-    assert (
-        verdict.passed
-        and verdict.goal == pytest.approx(14.9)
-        and verdict.delay == pytest.approx(0.0)
-        and verdict.jerk == 0.0
-    )
-    assert (
-        verdict.min_gap == pytest.approx(50.0 - 1.8)
-        and verdict.min_ttc == 8.0
-        and math.isnan(verdict.min_pet)
-    )
+    road = strip(2.0)
+    verdict, _ = verdict_of(BESIDE, go_on, road=road)
+    assert verdict.passed and verdict.jerk == 0.0
+    assert verdict.goal == pytest.approx(14.9) and verdict.delay == pytest.approx(0.0)
+    assert verdict.min_gap == pytest.approx(50.0 - 1.8)
+    assert verdict.min_ttc == 8.0 and math.isnan(verdict.min_pet)
     verdict, _ = verdict_of(
-        motions,
+        BESIDE,
         lambda seen: Pose(10.0 * (seen.time + 0.1), 2.0 * (seen.time + 0.1), 0.0, 10.0),
         road=road,
     )
-    assert (
-        verdict.off_road == pytest.approx(0.6, abs=2e-3) and not verdict.passed
-    )  # 1.1 m of room, 0.1 m allowed, at 2 m/s
+    assert not verdict.passed
+    assert verdict.off_road == pytest.approx(
+        0.6, abs=2e-3
+    )  # 1.1 m and the 0.1 m allowed, at 2 m/s
     assert verdict.progress == pytest.approx(5.0 / 149.0, abs=0.01), "what is driven on the road"
-    verdict, _ = verdict_of(motions, lambda _: Command(-5.0, 0.0), road=road)
+    verdict, _ = verdict_of(BESIDE, lambda _: Command(-5.0, 0.0), road=road)
     assert math.isnan(verdict.goal) and verdict.progress == pytest.approx(10.0 / 149.0, abs=0.01)
-    assert verdict.hardest_braking == pytest.approx(5.0) and verdict.hard_braking == pytest.approx(
-        2.0
-    )
-    verdict, _ = verdict_of(motions, lambda seen: None if seen.time < 0.25 else Command(1.0, 0.0))
-    assert (
-        verdict.faults == 3
-        and not verdict.road_known
-        and "3 faulty command(s)" in verdict.sentence()
-    )
+    assert verdict.hardest_braking == pytest.approx(5.0)
+    assert verdict.hard_braking == pytest.approx(2.0)
+    verdict, _ = verdict_of(BESIDE, lambda seen: None if seen.time < 0.25 else Command(1.0, 0.0))
+    assert verdict.faults == 3 and not verdict.road_known
+    assert "3 faulty command(s)" in verdict.sentence()
 
 
 def test_time_to_collision_and_post_encroachment():
@@ -171,9 +150,8 @@ def test_two_workers_give_same_bytes(trials):
     first, second = (Drives(outcomes, name, config, trials) for outcomes in (one, two))
     assert first.json() == second.json() and as_junit(first) == as_junit(second)
     assert first.page() == second.page() and all(trial.name in first.page() for trial in trials)
-    assert [outcome.name for outcome in one] == ["meet", "free", "first"] and all(
-        o.verdict.passed for o in one
-    )
+    assert [outcome.name for outcome in one] == ["meet", "free", "first"]
+    assert all(o.verdict.passed for o in one)
 
 
 def test_json_junit_rates_and_bars(trials):
@@ -182,10 +160,8 @@ def test_json_junit_rates_and_bars(trials):
     )
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     found = rates(outcomes)
-    assert (
-        found["collisions"].count == len([o for o in outcomes if o.verdict.collision]) == 1
-        and found["goals"].count == 2
-    )
+    assert found["collisions"].count == len([o for o in outcomes if o.verdict.collision]) == 1
+    assert found["goals"].count == 2
     suite = ElementTree.fromstring(as_junit(Drives(outcomes, "p:C", ClosedLoopConfig())))
     assert suite.get("tests") == "3" and suite.get("failures") == str(len(failed))
     assert [case.get("name") for case in suite if case.find("failure") is not None] == [
@@ -206,68 +182,45 @@ def test_json_junit_rates_and_bars(trials):
 
 
 def test_reference_speed_passes_standing_does_not():
-    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
-    assert verdict_of(motions, go_on)[0].fault == ""
-    verdict, _ = verdict_of(motions, lambda _: Command(-3.0, 0.0))
+    assert verdict_of(BESIDE, go_on)[0].fault == ""
+    verdict, _ = verdict_of(BESIDE, lambda _: Command(-3.0, 0.0))
     assert verdict.fault == "standing" and verdict.progress < 0.2
 
 
 def test_jump_fails_despite_the_goal():
-    verdict, _ = verdict_of(
-        [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)],
-        lambda _: Pose(149.0, 0.0, 0.0, 10.0),
-    )
+    verdict, _ = verdict_of(BESIDE, lambda _: Pose(149.0, 0.0, 0.0, 10.0))
     assert np.isnan(verdict.goal) and verdict.jumps == 1 and verdict.collision is None
-    assert (
-        not verdict.passed
-        and verdict.fault == verdict.failure == "jump"
-        and "1 teleport(s)" in verdict.sentence()
-    )
+    assert not verdict.passed and verdict.fault == verdict.failure == "jump"
+    assert "1 teleport(s)" in verdict.sentence()
 
 
 def test_jump_is_no_collision_or_exit():
     """From one lane across another car to a place beyond the road's edge."""
-    drivable = np.ones((100, 1000), dtype=np.bool_)
-    road = Road(
-        "field", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
-    )
-    motions = [straight(0, 0, 0, 10.0), straight(0.0, 4.0, 0, 10.0)]
     verdict, _ = verdict_of(
-        motions,
+        [straight(0, 0, 0, 10.0), straight(0.0, 4.0, 0, 10.0)],
         lambda seen: Pose(10.0 * (seen.time + 0.1), 80.0 * (seen.time > 0.45), 0.0, 10.0),
-        road=road,
+        road=strip(10.0),
     )
-    assert (
-        verdict.failure == "jump"
-        and verdict.collision is None
-        and np.isnan(verdict.off_road)
-        and verdict.road_margin > 0.0
-    )
+    assert verdict.failure == "jump" and verdict.collision is None
+    assert np.isnan(verdict.off_road) and verdict.road_margin > 0.0
 
 
 @pytest.mark.parametrize(("aside", "counted"), [(0.02, False), (0.3, True)])
 def test_off_road_counts_from_a_depth(aside, counted):
-    drivable = np.zeros((100, 1000), dtype=np.bool_)
-    drivable[40:60] = True  # y from -2 to 2 m
-    road = Road(
-        "strip", drivable, 0.2, np.array((-20.0, -10.0)), np.empty((0, 3)), np.empty((0, 3))
-    )
-    motions = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]
+    road = strip(2.0)
 
     def beside(seen):
         time = seen.time + 0.1
         return Pose(10.0 * time, min(time, 1.1 + aside), 0.0, 10.0)
 
-    verdict, drive = verdict_of(motions, beside, road=road)
-    assert (
-        verdict.road_margin == pytest.approx(-aside, abs=1e-6)
-        and np.isfinite(verdict.off_road) == counted
-    )
+    verdict, drive = verdict_of(BESIDE, beside, road=road)
+    assert verdict.road_margin == pytest.approx(-aside, abs=1e-6)
+    assert np.isfinite(verdict.off_road) == counted
     assert verdict.passed != counted and (f"by {aside:.2f} m" in verdict.sentence()) == counted
     assert drive.motion.position[0, -1, 1] > 1.1
-    verdict, _ = verdict_of(motions, beside, road=road, off_road_depth=0.0)
+    verdict, _ = verdict_of(BESIDE, beside, road=road, off_road_depth=0.0)
     assert np.isfinite(verdict.off_road)
-    verdict, _ = verdict_of(motions, go_on, road=road)
+    verdict, _ = verdict_of(BESIDE, go_on, road=road)
     assert verdict.road_margin == pytest.approx(1.1)
     assert "by more than 10 m" in replace(verdict, off_road=1.0, road_margin=-10.0).sentence()
 

@@ -36,11 +36,9 @@ def by_all_pairs(a, b):
 def test_follower_has_twice_its_time_gap(seed):
     random = np.random.default_rng(seed)
     for _ in range(100):
-        speed, behind, turned = (
-            random.uniform(10.0, 40.0),
-            random.uniform(0.5, 3.0),
-            random.uniform(-3.0, 3.0),
-        )
+        speed = random.uniform(10.0, 40.0)
+        behind = random.uniform(0.5, 3.0)
+        turned = random.uniform(-3.0, 3.0)
         along = np.array([np.cos(turned), np.sin(turned)])
         a, b = speed * TIME[:, None] * along, speed * (TIME[:, None] - behind) * along
         for one, other in ((a, b), (b, a)):
@@ -60,9 +58,7 @@ def test_gap_is_least_of_all_moments(seed):
 
 
 def test_passing_vehicles_have_their_lateral_gap():
-    a, b = (
-        np.column_stack([20.0 * (TIME - 6.0), 0.0 * TIME]),
-        np.column_stack([-20.0 * (TIME - 6.0), 3.5 + 0.0 * TIME]),
-    )
+    a = np.column_stack([20.0 * (TIME - 6.0), 0.0 * TIME])
+    b = np.column_stack([-20.0 * (TIME - 6.0), 3.5 + 0.0 * TIME])
     assert space_time_gap(a, b, DT) == (pytest.approx(3.5, abs=1e-3), 60, 60)
     assert space_time_gap(a, a, DT)[0] == 0.0

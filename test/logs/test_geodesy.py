@@ -114,9 +114,8 @@ def test_chain_of_places_is_one_site():
     along = np.column_stack([np.full(100, 50.0), np.linspace(-181.0, -170.0, 100)])
     assert set(sites_of(along)) == {0}
     assert len(set(sites_of(np.vstack([along, along + 1.0])))) == 2
-    assert middle_of(along) == (50.0, -175.5) and middle_of(
-        np.array([[1.0, 179.0], [1.0, -179.0]])
-    ) == (1.0, -180.0)
+    assert middle_of(along) == (50.0, -175.5)
+    assert middle_of(np.array([[1.0, 179.0], [1.0, -179.0]])) == (1.0, -180.0)
 
 
 def test_there_and_back():

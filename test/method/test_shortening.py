@@ -16,11 +16,7 @@ from scenario_gen.method.chain import EmptySetError, Generation
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.shortening import cut, fitting_part
 from scenario_gen.numerics.rounding import ROUNDING_S
-from scenario_gen.situation import (
-    interaction_windows,
-    keeps_interaction,
-    Situation,
-)
+from scenario_gen.situation import interaction_windows, keeps_interaction, Situation
 from scenario_gen.types import Encounter, GenerationResult, NoteKind, Request, Segmentation
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"

@@ -10,10 +10,7 @@ from support.textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.method.chain import (
-    suitable_roads,
-    with_suitable_roads,
-)
+from scenario_gen.method.chain import suitable_roads, with_suitable_roads
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import generate, PipelineConfig

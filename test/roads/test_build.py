@@ -34,10 +34,8 @@ def test_one_entry_and_exit_per_lane(name, lanes, side):
                 0
             ]
     # two vehicles that meet on the same road pass on the agreed side of each other
-    entry, leave = (
-        road.entries[0],
-        next(x for x in road.exits if abs(np.cos(x[2] - road.entries[0][2]) + 1.0) < 1e-6),
-    )
+    entry = road.entries[0]
+    leave = next(x for x in road.exits if abs(np.cos(x[2] - road.entries[0][2]) + 1.0) < 1e-6)
     left = -np.sin(entry[2]) * (leave[0] - entry[0]) + np.cos(entry[2]) * (leave[1] - entry[1])
     assert (left > 0.0) == (side == "right")
 

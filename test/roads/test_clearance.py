@@ -11,11 +11,7 @@ from shapely import affinity
 from shapely.geometry import box, LineString, Point
 from shapely.ops import unary_union
 
-from scenario_gen.roads.clearance import (
-    footprint_fits,
-    nearest_pose_with_room,
-    segments_free,
-)
+from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room, segments_free
 from scenario_gen.roads.connectivity import free_cells, free_space, FreeSpace
 from scenario_gen.types.road import Road
 

@@ -51,10 +51,8 @@ BICYCLE = Vehicle("b", 1.8, 0.65, "bicycle")
 )
 def test_cycle_lanes_lie_beside_outermost_lanes(name, arms, ways, side):
     config = RoadConfig(lanes=2, cycle_lane=1.8, traffic_side=side)
-    road, plain = (
-        build_road(name, None, config),
-        build_road(name, None, RoadConfig(lanes=2, traffic_side=side)),
-    )
+    road = build_road(name, None, config)
+    plain = build_road(name, None, RoadConfig(lanes=2, traffic_side=side))
     assert [lane.id for lane in road.lanes.lanes] == [lane.id for lane in plain.lanes.lanes]
     assert road.drivable.sum() == pytest.approx(
         plain.drivable.sum(), rel=0.01
@@ -74,10 +72,8 @@ def test_cycle_lanes_lie_beside_outermost_lanes(name, arms, ways, side):
             inner.right if side == "right" else inner.left,
         )
         assert np.hypot(*(lane.left - lane.right).T) == pytest.approx(1.8)
-        assert (
-            ground.drivable_at(lane.centre[1:-1]).all()
-            and not road.drivable_at(lane.centre[2:-2]).any()
-        )
+        assert ground.drivable_at(lane.centre[1:-1]).all()
+        assert not road.drivable_at(lane.centre[2:-2]).any()
     for lane in road.lanes.others:
         assert lane.users == {"bicycle"} and ground.drivable_at(lane.centre[1:-1]).all()
         for k in lane.successors:
@@ -94,17 +90,15 @@ def test_zebra_crossings_precede_stop_lines(name, side):
     road = build_road(name, None, config)
     walks = road.lanes.others
     arms = len(road.lanes.arms) if road.lanes.arms else 1
-    assert len(walks) == (1 if name in ("straight", "curve") else arms) and all(
-        lane.crossing for lane in walks
-    )
+    assert len(walks) == (1 if name in ("straight", "curve") else arms)
+    assert all(lane.crossing for lane in walks)
     for lane in walks:
         assert road.drivable_at(lane.centre[:1] + 0.05 * (lane.centre[-1] - lane.centre[0])).all()
         beyond = lane.centre[[0, -1]] + np.array([[-0.05], [0.05]]) * (
             lane.centre[-1] - lane.centre[0]
         )
-        assert not road.drivable_at(beyond).any() and np.hypot(
-            *(lane.left - lane.right)[0]
-        ) == pytest.approx(4.0, rel=0.02)
+        assert not road.drivable_at(beyond).any()
+        assert np.hypot(*(lane.left - lane.right)[0]) == pytest.approx(4.0, rel=0.02)
     for rule in road.lanes.rules:
         lane, line = road.lanes.lanes[rule.lanes[0]], rule.line.mean(axis=0)
         walk = min(walks, key=lambda one: np.hypot(*(one.centre.mean(axis=0) - line)))

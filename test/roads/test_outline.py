@@ -29,9 +29,8 @@ def test_array_is_taken_as_it_is():
     cells = np.zeros((40, 300), dtype=bool)
     cells[5:40] = True
     road = build_road(cells, None, RoadConfig(resolution=0.1, obstacles="10 2 0 2 1"))
-    assert np.array_equal(
-        road.drivable | road.obstructed, cells
-    ) and road.resolution == pytest.approx(0.1)
+    assert np.array_equal(road.drivable | road.obstructed, cells)
+    assert road.resolution == pytest.approx(0.1)
     assert road.origin.tolist() == [0.0, 0.0]
 
 

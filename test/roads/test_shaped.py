@@ -158,10 +158,8 @@ def test_recorded_roundabout_keeps_its_size(radius, circles):
     for come, leave in ((np.pi, 0.0), (-np.pi / 2.0, np.pi / 2.0)):
         out = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in (come, leave)]
         beside = [1.75 * np.array([-y, x]) for x, y in out]
-        start, goal = (
-            np.array([*(90.0 * out[0] + beside[0]), come + np.pi]),
-            np.array([*(90.0 * out[1] - beside[1]), leave]),
-        )
+        start = np.array([*(90.0 * out[0] + beside[0]), come + np.pi])
+        goal = np.array([*(90.0 * out[1] - beside[1]), leave])
         way = draw_ring_route(start, goal, np.zeros(2), radius)
         away = np.maximum(np.hypot(*way.points[:, :2].T) - radius - 3.0, 0.0)
         speed = np.minimum(np.sqrt(36.0 + 4.0 * away), 14.0)
@@ -179,9 +177,8 @@ def test_recorded_roundabout_keeps_its_size(radius, circles):
         speeds[1] = np.full(T, 50.0 * radius / T)
     road, fit = fitted(made(*zip(poses, speeds, strict=True)), "roundabout")
     assert ring_of(road)[1] == pytest.approx(radius, abs=0.3)
-    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0 and {
-        loss.kind for loss in fit.losses
-    } <= {"arm"}
+    assert max(np.abs(vehicle.scale - 1.0) for vehicle in fit.fitted) == 0.0
+    assert {loss.kind for loss in fit.losses} <= {"arm"}
     if not circles:  # it is wide enough for a trailer, too
         encounter = made(*zip(poses, speeds, strict=True))
         truck = Vehicle("0", 7.0, 2.5, "truck", Trailer("t", 10.0, 2.5, 3.2, 4.5))

@@ -94,12 +94,10 @@ def test_junction_turn_differs_from_bend():
     turner, bender = clean_tracks(
         encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), arc(0.0, 50.0, 0.0, -80.0, 8.0))
     )
-    assert (
-        turner.turns
-        and turner.turning(30.0) > 0.0
-        and not turner.makes_u_turn
-        and not bender.turns
-    )
+    assert turner.turns
+    assert turner.turning(30.0) > 0.0
+    assert not turner.makes_u_turn
+    assert not bender.turns
     (round_, _) = clean_tracks(
         encounter_of(arc(0.0, 0.0, 0.0, 6.0, 2.0), line(0.0, 40.0, 0.0, 5.0))
     )

@@ -15,10 +15,8 @@ from scenario_gen.types import Encounter, Vehicle
 def oncoming(side):
     """Two vehicles that pass each other, each on its own `side` of the road: 1 for the right."""
     time = np.arange(101) * 0.1
-    there, back = (
-        np.column_stack([10.0 * time - 50.0, np.full(101, -1.75 * side)]),
-        np.column_stack([50.0 - 10.0 * time, np.full(101, 1.75 * side)]),
-    )
+    there = np.column_stack([10.0 * time - 50.0, np.full(101, -1.75 * side)])
+    back = np.column_stack([50.0 - 10.0 * time, np.full(101, 1.75 * side)])
     heading = np.stack([np.zeros(101), np.full(101, np.pi)])
     return Encounter.sampled(
         (Vehicle("1"), Vehicle("2")),

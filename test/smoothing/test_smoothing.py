@@ -14,11 +14,7 @@ from scipy.optimize import minimize
 from scenario_gen.logs import LogConfig
 from scenario_gen.logs.encounters import cut_track, pieces_of
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import (
-    interpolated_piece,
-    smooth_piece,
-    standing,
-)
+from scenario_gen.logs.smoothing import interpolated_piece, smooth_piece, standing
 from scenario_gen.smoothing.motion import Motion
 from scenario_gen.smoothing.path import (
     estimated_noise,

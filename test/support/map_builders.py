@@ -216,10 +216,8 @@ def opendrive(reference="", signs=None):
             )
             shape, length = ("<line/>", 2.0 * HALF)
             if way != "straight":
-                shape, length = (
-                    f'<arc curvature="{(1.0 if way == "left" else -1.0) / HALF!r}"/>',
-                    math.pi * HALF / 2.0,
-                )
+                shape = f'<arc curvature="{(1.0 if way == "left" else -1.0) / HALF!r}"/>'
+                length = math.pi * HALF / 2.0
             links = '<predecessor id="-1"/><successor id="1"/>'
             road(
                 number,

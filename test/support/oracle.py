@@ -28,10 +28,8 @@ def drivable_area(road: Road) -> shapely.Geometry:
     for row, cells in enumerate(road.drivable):
         edges = np.flatnonzero(np.diff(np.concatenate(([0], cells.astype(int), [0]))))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
-            x, y = (
-                road.origin + road.resolution * np.array((begin, row)),
-                road.origin + road.resolution * np.array((end, row + 1)),
-            )
+            x = road.origin + road.resolution * np.array((begin, row))
+            y = road.origin + road.resolution * np.array((end, row + 1))
             boxes.append(shapely.box(*x, *y))
     area = shapely.union_all(boxes)
     shapely.prepare(area)

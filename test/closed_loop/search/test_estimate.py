@@ -173,9 +173,8 @@ def test_smaller_budget_begins_larger_one():
     small, large = Plane(1e-2), Plane(1e-2)
     Search(small, 5, 333).run()
     Search(large, 5, 480).run()
-    assert len(small.driven) == 333 and all(
-        np.array_equal(a, b) for a, b in zip(small.driven, large.driven[:333], strict=True)
-    )
+    assert len(small.driven) == 333
+    assert all(np.array_equal(a, b) for a, b in zip(small.driven, large.driven[:333], strict=True))
 
 
 @pytest.mark.parametrize(
@@ -188,12 +187,10 @@ def test_degenerate_searches_give_what_they_can(rate, allowed, budget):
     if allowed == -math.inf:
         assert estimate.drives == 0 and math.isnan(estimate.rate.value)
         return
-    assert estimate.drives == len(problem.driven) == budget and all(
-        row[7] < allowed for row in problem.driven
-    )
-    assert 0.0 <= estimate.rate.low <= estimate.rate.high <= (0.2 if rate < 1e-9 else 1.0) and (
-        estimate.first == 0 or rate > 1e-9
-    )
+    assert estimate.drives == len(problem.driven) == budget
+    assert all(row[7] < allowed for row in problem.driven)
+    assert 0.0 <= estimate.rate.low <= estimate.rate.high <= (0.2 if rate < 1e-9 else 1.0)
+    assert estimate.first == 0 or rate > 1e-9
 
 
 def test_worst_search_finds_worse_margins():

@@ -88,9 +88,8 @@ def found(bag, tmp_path_factory):
 
 def test_findings_are_certified_with_passing_witness(found):
     result, out = found
-    assert result.findings and all(
-        one.passed and not one.outcome.verdict.passed for one in result.findings
-    )
+    assert result.findings
+    assert all(one.passed and not one.outcome.verdict.passed for one in result.findings)
     (validation,) = evaluate_bag(out / "bag")
     assert len(validation.verdicts) == len(result.findings) == validation.valid
 
@@ -106,16 +105,12 @@ def test_the_bag_of_failures_fails_again(found):
 def test_files_say_what_was_found(found):
     result, out = found
     document = json.loads((out / "search.json").read_text())
-    assert (
-        document["drives"] == BUDGET
-        and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
-    )
-    rates = document["rates"]  # of both, whatever is searched for
-    assert (
-        rates["collision"] == document["rate"]
-        and 0.0 < rates["at_fault"]["value"] <= rates["collision"]["value"]
-    )
-    assert document["bound"] >= document["rate"]["high"]
+    rate, rates = document["rate"], document["rates"]  # of both, whatever is searched for
+    assert document["drives"] == BUDGET
+    assert rate["low"] <= rate["value"] <= rate["high"]
+    assert rates["collision"] == rate
+    assert 0.0 < rates["at_fault"]["value"] <= rate["value"]
+    assert document["bound"] >= rate["high"]
     assert len(document["findings"]) == len(result.findings) and document["kinds"]
     suite = ElementTree.parse(out / "junit.xml").getroot()
     assert int(suite.get("failures")) == len(result.findings)
@@ -131,17 +126,14 @@ def test_stopped_search_resumes_with_same_bytes(bag, found, tmp_path):
     search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
     for name in ("search.json", "search.html", "junit.xml", "bag/bag_0.mcap"):
         assert (tmp_path / "out" / name).read_bytes() == (found[1] / name).read_bytes()
-    with pytest.raises(InputError, match="of another search \\(objective differ"):
-        search_failures(
-            request_of(bag, "Blind", objective=Objective("goal")), tmp_path / "out", workers=1
-        )
+    other = request_of(bag, "Blind", objective=Objective("goal"))
+    with pytest.raises(InputError, match=r"another search \(objective"):
+        search_failures(other, tmp_path / "out", workers=1)
 
 
 def test_other_journals_are_refused_and_stay(bag, found, tmp_path):
-    journal, lines = (
-        tmp_path / f"out{JOURNAL}",
-        found[1].with_name(f"out{JOURNAL}").read_text().splitlines(keepends=True),
-    )
+    journal = tmp_path / f"out{JOURNAL}"
+    lines = found[1].with_name(journal.name).read_text().splitlines(keepends=True)
     other = lines[2].replace(lines[2].split(",")[1], " 7.25", 1)
     (tmp_path / "elsewhere").write_text("".join(lines))
     for text, said in (
@@ -159,10 +151,8 @@ def test_other_journals_are_refused_and_stay(bag, found, tmp_path):
             journal.write_text(text)
         with pytest.raises(InputError, match=rf"{said}.*; move it away, or give another --out"):
             search_failures(request_of(bag, "Blind"), tmp_path / "out", workers=1)
-        assert (
-            journal.read_text() == ("".join(lines) if text is None else text)
-            and not (tmp_path / "out").exists()
-        )
+        assert journal.read_text() == ("".join(lines) if text is None else text)
+        assert not (tmp_path / "out").exists()
 
 
 def test_failing_planner_keeps_its_drives(bag, tmp_path):
@@ -172,18 +162,10 @@ def test_failing_planner_keeps_its_drives(bag, tmp_path):
 
 
 def test_standing_planner_misses_every_goal(bag, tmp_path):
-    result = search_failures(
-        request_of(
-            bag, "Stands", objective=Objective("goal"), budget=12, assignments=["overtime=1.0"]
-        ),
-        tmp_path / "out",
-        workers=1,
-    )
-    assert (
-        result.estimate.first == 1
-        and result.estimate.rate.high == 1.0
-        and result.estimate.rate.low > 0.7
-    )
+    goal = {"objective": Objective("goal"), "budget": 12, "assignments": ["overtime=1.0"]}
+    result = search_failures(request_of(bag, "Stands", **goal), tmp_path / "out", workers=1)
+    assert result.estimate.first == 1
+    assert 0.7 < result.estimate.rate.low < result.estimate.rate.high == 1.0
 
 
 @pytest.mark.parametrize(
@@ -196,9 +178,8 @@ def test_bad_requests_are_refused(bag, tmp_path, further, message):
 
 
 def test_objectives():
-    assert Objective.parsed(" pet < 1 ") == Objective("pet", 1.0) and Objective.parsed(
-        "goal"
-    ) == Objective("goal")
+    assert Objective.parsed(" pet < 1 ") == Objective("pet", 1.0)
+    assert Objective.parsed("goal") == Objective("goal")
     assert str(Objective.parsed("imposed_braking>2.5")) == "imposed_braking>2.5"
     for text in ("speed", "ttc", "ttc<", "ttc>1", "ttc<-1", "pet<1s", "imposed_braking<1", ""):
         with pytest.raises(InputError, match="take at_fault"):
@@ -225,45 +206,30 @@ def test_margins_are_negative_in_failures_only(bag):
     for planner in ("Strays", "Blind"):
         (outcome, *_) = run_trials(read_trials(bag, "2", 1), f"{__name__}:{planner}")
         response = Objective("off_road").response(outcome)
-        assert response.margin == outcome.verdict.road_margin + 0.1 and response.failed == (
-            planner == "Strays"
-        )
+        assert response.margin == outcome.verdict.road_margin + 0.1
+        assert response.failed == (planner == "Strays")
 
 
 def test_command_searches_log_on_a_road(tmp_path):
     words = f"search {LOG} --road {ROAD} --planner {__name__}:Blind --ego 2 --budget 12 --workers 1 --out {tmp_path}/out".split()
     done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
-    assert (
-        done.exit_code == 1
-        and "the failure rate may exceed 0" in done.output
-        and "by the ego's fault:" in done.output
-    ), done.output
-    assert (
-        "natural drives alone" in done.output
-        and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
-    )
-    refused = CliRunner().invoke(app, [*words, "--max-rate", "0.1", "--worst"])
-    assert "a search for the worst failure estimates no rate" in str(refused.exception)
-    refused = CliRunner().invoke(app, [*words, "--encounter", "none"])
-    assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(
-        refused.exception
-    )
+    assert done.exit_code == 1, done.output
+    for said in ("failure rate may exceed 0", "by the ego's fault:", "natural drives alone"):
+        assert said in done.output
+    assert json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
+    for wrong, said in (("--max-rate 0.1 --worst", "no rate"), ("--encounter none", "'none'")):
+        refused = CliRunner().invoke(app, [*words, *wrong.split()])
+        assert isinstance(refused.exception, InputError) and said in str(refused.exception)
 
 
 def test_outcome_search_weights_its_failures(tmp_path):
     encounter = replace(labelled("crossing, stops", 0).encounter, name="crossing")
-    (drawn,) = (
-        decision
-        for decision in decisions_of(encounter).possible
-        if decision.outcome is Outcome.GOES_FIRST
-    )
+    possible = decisions_of(encounter).possible
+    (drawn,) = (one for one in possible if one.outcome is Outcome.GOES_FIRST)
     case = generate(decided(encounter, drawn), "corridor", count=1, seed=7)
     bag = write_recording(tmp_path / "bag", case)
-    found = search_failures(
-        request_of(bag, "Stands", ego=drawn.whom, objective=Objective("goal"), budget=3),
-        tmp_path / "out",
-        workers=1,
-    )
+    request = request_of(bag, "Stands", ego=drawn.whom, objective=Objective("goal"), budget=3)
+    found = search_failures(request, tmp_path / "out", workers=1)
     assert found.decision == drawn
     share = f"to {100.0 * drawn.probability * found.estimate.rate.high:.3g} % fail in this way"
     assert any(share in sentence for sentence in found.sentences())

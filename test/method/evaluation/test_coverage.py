@@ -11,13 +11,7 @@ import pytest
 
 from scenario_gen.method.evaluation import coverage_of
 from scenario_gen.method.evaluation.measures import measure
-from scenario_gen.types import (
-    Encounter,
-    Facts,
-    OrderChange,
-    PassingOrder,
-    Vehicle,
-)
+from scenario_gen.types import Encounter, Facts, OrderChange, PassingOrder, Vehicle
 from scenario_gen.types.scenario import Scenario
 
 TIME = np.arange(101) * 0.1
@@ -60,11 +54,9 @@ def test_figures_matrix_and_picks(template):
     assert found.spreads["pet"].values == pytest.approx((0.2, 1.3, 1.5, 4.4), abs=0.02)
     assert found.spreads["pet"].template == pytest.approx(1.4, abs=0.02)
     assert found.pairs == {"straight and straight": (0, 1, 0, 2, 0, 1, 0)}
-    assert (
-        found.picks["most critical"] == 5
-        and found.picks["most different"] == 8
-        and found.picks["most typical"] in (6, 7)
-    )
+    assert found.picks["most critical"] == 5
+    assert found.picks["most different"] == 8
+    assert found.picks["most typical"] in (6, 7)
     document = json.loads(json.dumps(found.document(), allow_nan=False))
     assert document["figures"]["ttc"]["values"] == [None] * 4 and document["index"] == [5, 6, 7, 8]
 

@@ -67,9 +67,8 @@ def test_rows_say_what_happened():
     assert all(
         math.isnan(estimate.low) for estimate in found.row("replay").values.values()
     )  # one sample has no interval
-    assert math.isnan(found.value("replay", "diversity")) and math.isnan(
-        found.value("nobody", "e_position")
-    )
+    assert math.isnan(found.value("replay", "diversity"))
+    assert math.isnan(found.value("nobody", "e_position"))
 
 
 def test_estimates_lie_in_their_intervals():
@@ -173,10 +172,8 @@ def test_long_template_is_resampled():
     found = evaluate_scenarios(
         encounter, {"x": [replayed(encounter)]}, changepoints=K, config=config
     )
-    assert (
-        "60 steps" in str(found.row("recording").notes[0])
-        and found.value("x", "e_position") < 1e-6
-    )
+    assert "60 steps" in str(found.row("recording").notes[0])
+    assert found.value("x", "e_position") < 1e-6
 
 
 def test_replay_keeps_dwells_and_chords():

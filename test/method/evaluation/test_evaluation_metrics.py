@@ -31,11 +31,9 @@ ONCE = np.ones((1, 1))
 
 def still(xy, yaw, sizes=((4.0, 2.0), (4.0, 2.0)), speed=(0.0, 0.0)):
     vehicles = tuple(Vehicle(str(n), *size) for n, size in enumerate(sizes))
-    position, heading, pace = (
-        np.array(xy, float)[:, None],
-        np.array(yaw, float)[:, None],
-        np.array(speed, float)[:, None],
-    )
+    position = np.array(xy, float)[:, None]
+    heading = np.array(yaw, float)[:, None]
+    pace = np.array(speed, float)[:, None]
     return Motion.sampled(vehicles, 0.1, position, heading, pace)
 
 
@@ -184,9 +182,8 @@ def test_mean_interval_agrees_with_scipy():
     ).confidence_interval
     assert ours.value == pytest.approx(values.mean())
     width = theirs.high - theirs.low
-    assert ours.low == pytest.approx(theirs.low, abs=0.08 * width) and ours.high == pytest.approx(
-        theirs.high, abs=0.08 * width
-    )
+    assert ours.low == pytest.approx(theirs.low, abs=0.08 * width)
+    assert ours.high == pytest.approx(theirs.high, abs=0.08 * width)
 
 
 @pytest.mark.parametrize(("count", "total"), [(0, 20), (3, 50), (50, 50)])
@@ -197,9 +194,7 @@ def test_wilson_equals_scipy(count, total):
     assert math.isnan(wilson(0, 0, 0.95).value)
 
 
-def test_pooled_units_keep_error_and_interval(
-    monkeypatch,
-):
+def test_pooled_units_keep_error_and_interval(monkeypatch):
     """At most MAX_UNIT_COUNT units are drawn, and the value does not depend on how they are pooled."""
     encounter = crossing()
     scenarios = samples(encounter, 150)

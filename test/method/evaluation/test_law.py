@@ -25,15 +25,9 @@ from scenario_gen.method.evaluation.law import (
     VEHICLE_FEATURES,
 )
 from scenario_gen.method.evaluation.measures import distance_and_ttc
-from scenario_gen.method.sampling import (
-    SamplingConfig,
-)
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.situation import find_conflicts
-from scenario_gen.types import (
-    Cause,
-    NoteKind,
-    Scenario,
-)
+from scenario_gen.types import Cause, NoteKind, Scenario
 
 POPULATION = PipelineConfig(sampling=SamplingConfig())
 NAMES = FEATURES + JOINT_FEATURES

@@ -265,9 +265,7 @@ def test_turns_take_arms_on_their_side():
 
 
 @pytest.mark.parametrize("road_name", ["curve", "t_intersection", "four_way"])
-def test_platoon_keeps_its_bend_and_gaps(
-    road_name,
-):
+def test_platoon_keeps_its_bend_and_gaps(road_name):
     bend = turn(0.0, 0.0, 0.0, 20.0, 1.4, 120.0, 400.0)
     ahead = Curve(bend.at(np.arange(18.0, 400.0, 0.5)))
     encounter = encounter_of(driven(ahead, np.full(150, 12.0)), driven(bend, np.full(150, 12.0)))

@@ -106,10 +106,8 @@ def test_the_sweep_is_exact(seed):
     )
     swept = shapely.convex_hull(shapely.union_all(footprints(poses[:, :2], poses[:, 2], *size)))
     area = drivable_area(road)
-    overlap, doubt = (
-        swept.difference(area).area,
-        swept.buffer(0.01).difference(area).area - swept.buffer(-0.01).difference(area).area,
-    )
+    overlap = swept.difference(area).area
+    doubt = swept.buffer(0.01).difference(area).area - swept.buffer(-0.01).difference(area).area
     assume(overlap > 0.02 or doubt == 0.0)
     both = sweep_is_free(road, poses, *size)[:, 0]
     assert (both.min() > 0.0) == (overlap == 0.0)

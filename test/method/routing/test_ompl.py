@@ -13,11 +13,7 @@ from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.ompl_planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.ompl_solve import PLANNERS
-from scenario_gen.method.routing.search.planner import (
-    Budget,
-    BudgetSpentError,
-    path_length,
-)
+from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.numerics import wrap_angle
 

@@ -23,10 +23,8 @@ from scenario_gen.method.sampling.gp import (
 def dense(x, y, noise, at, sigma, length, degree):
     """Rasmussen & Williams eqs 2.25, 2.26 and, with a fitted mean, 2.41 and 2.42."""
     k = squared_exponential(x, x, sigma, length) + np.diag(noise**2)
-    cross, prior = (
-        squared_exponential(x, at, sigma, length),
-        squared_exponential(at, at, sigma, length),
-    )
+    cross = squared_exponential(x, at, sigma, length)
+    prior = squared_exponential(at, at, sigma, length)
     factor = scipy.linalg.cho_factor(k)
 
     def solve(b):

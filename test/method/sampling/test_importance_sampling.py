@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, kstest, multivariate_normal, norm, ortho_group
 
-from scenario_gen.method.sampling.sampler import (
-    directions,
-    estimated_share,
-    Proposal,
-)
+from scenario_gen.method.sampling.sampler import directions, estimated_share, Proposal
 
 DIMENSION = 5
 BASIS = ortho_group.rvs(DIMENSION, random_state=3)[:2]

@@ -53,6 +53,5 @@ def test_each_slice_moves_its_namesake(model, name):
     }
     names = {"lateral": "path", "place": "path", "end_speeds": "speed", "strength": "speed"}
     expected = names.get(name, name)
-    assert moved[expected] and not any(
-        value for key, value in moved.items() if key not in (expected, "speed")
-    )
+    assert moved[expected]
+    assert not any(value for key, value in moved.items() if key not in (expected, "speed"))

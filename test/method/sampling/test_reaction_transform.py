@@ -45,10 +45,8 @@ FREE = PipelineConfig(sampling=replace(LITTLE, reactions="none"))
 @pytest.fixture(scope="module", params=["lane", "crossing"])
 def case(request):
     encounter = {"lane": LANE, "crossing": CROSSING}[request.param]
-    road, segmentation = (
-        build_road("corridor", encounter, CONFIG.road),
-        segment(encounter, CONFIG.segmentation, 1),
-    )
+    road = build_road("corridor", encounter, CONFIG.road)
+    segmentation = segment(encounter, CONFIG.segmentation, 1)
 
     def made(config=CONFIG, count=40):
         return Chain(
@@ -157,10 +155,8 @@ def test_published_reactions_answer(case):
 def test_yielder_is_slow_at_passing():
     encounter = labelled("meets another one closely", 3).encounter
     (edge,) = Situation.of(encounter).reactions.edges
-    road, segmentation = (
-        build_road("corridor", encounter, CONFIG.road),
-        segment(encounter, CONFIG.segmentation, 1),
-    )
+    road = build_road("corridor", encounter, CONFIG.road)
+    segmentation = segment(encounter, CONFIG.segmentation, 1)
     lost = []
     for config in (CONFIG, FREE):
         scenarios = (

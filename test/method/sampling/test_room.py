@@ -94,11 +94,9 @@ def test_deviations_are_bent_within_room():
     assert (np.abs(bent) <= 2.0).all() and np.abs(bent[[0, -1]]) == pytest.approx(2.0, abs=1e-3)
     np.testing.assert_allclose(bent, -bent[::-1], atol=1e-12)
     slope = np.diff(bent) / np.diff(deviation[0])
-    assert (
-        (slope >= 0.0).all()
-        and (slope <= 1.0 + 1e-9).all()
-        and np.abs(np.diff(slope)).max() < 0.03
-    )
+    assert (slope >= 0.0).all()
+    assert (slope <= 1.0 + 1e-9).all()
+    assert np.abs(np.diff(slope)).max() < 0.03
     share = (1.8 / 2.0 - 0.6) / 0.4
     assert np.interp(1.8, deviation[0], bent) == pytest.approx(
         2.0 * (0.6 + 0.4 * np.tanh(share)), abs=1e-3

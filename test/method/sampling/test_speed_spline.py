@@ -113,11 +113,9 @@ def test_mean_speed_is_the_minimum():
         < np.abs(plain(basis).jerk @ found).max()
     )
     fine = np.linspace(0.0, 20.0, 2001)
-    rows, bends, reach = (
-        basis.design(fine),
-        basis.design(fine, 2),
-        basis.driven(wanted.anchor_time),
-    )
+    rows = basis.design(fine)
+    bends = basis.design(fine, 2)
+    reach = basis.driven(wanted.anchor_time)
     line = np.interp(fine, TIME, speed)
 
     def cost(c):

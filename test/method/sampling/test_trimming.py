@@ -64,10 +64,8 @@ def test_conflict_and_a_second_stay(encounter):
     assert window.core[0] == pytest.approx(min(conflict.entry_first, conflict.entry_second))
     last = max(conflict.entry_second, conflict.exit_first)
     assert window.core[1] >= last + AFTER_CONFLICT_S - ROUNDING_S
-    assert (
-        trimming_of(Situation.of(encounter), 0.0, FREE) is None
-        and trimming_of(Situation.of(encounter), 0.5, ~FREE) is None
-    )
+    assert trimming_of(Situation.of(encounter), 0.0, FREE) is None
+    assert trimming_of(Situation.of(encounter), 0.5, ~FREE) is None
     position = encounter.position.copy()
     position[0] += 1000.0
     assert trimming_of(Situation.of(replace(encounter, position=position)), 0.5, FREE) is None

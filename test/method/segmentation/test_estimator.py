@@ -12,10 +12,7 @@ import pytest
 from scipy import stats
 from support.source_files import ROOT
 
-from scenario_gen.method.segmentation import (
-    SegmentationWarning,
-    StickyHDPHMM,
-)
+from scenario_gen.method.segmentation import SegmentationWarning, StickyHDPHMM
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::scenario_gen.method.segmentation.SegmentationWarning"

@@ -18,11 +18,9 @@ ODDS = np.array([0.2, 0.5, 0.3])
 
 def draw_prior(rng, samples, d, order):
     """Draw labels, series, concentrations, means and scales from the model."""
-    gamma, total, rho = (
-        rng.gamma(HYPER[0]) / HYPER[1],
-        rng.gamma(HYPER[2]) / HYPER[3],
-        rng.beta(HYPER[4], HYPER[5]),
-    )
+    gamma = rng.gamma(HYPER[0]) / HYPER[1]
+    total = rng.gamma(HYPER[2]) / HYPER[3]
+    rho = rng.beta(HYPER[4], HYPER[5])
     beta = np.maximum(rng.dirichlet(np.full(STATES, gamma / STATES)), 1e-12)
     own = rho * total * np.eye(STATES)
     pi = np.array(
@@ -80,11 +78,9 @@ def draw_series(rng, labels, regressions, roots, mass, order):
 
 def gibbs(v, labels, top, mass, chosen, d, order, dof, moves, seed):
     """Labels, concentrations, regressions after a sweep; `mass`, `chosen` are updated."""
-    samples, trace, emissions = (
-        np.empty((1, len(v)), np.int64),
-        np.empty((1, 5)),
-        np.empty((STATES, d, v.shape[1])),
-    )
+    samples = np.empty((1, len(v)), np.int64)
+    trace = np.empty((1, 5))
+    emissions = np.empty((STATES, d, v.shape[1]))
     top = top.copy()
     run_chain(
         Data(v, np.ascontiguousarray(v.T), mass, np.array([len(v)])),

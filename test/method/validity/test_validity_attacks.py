@@ -80,10 +80,8 @@ def test_standing_vehicle_does_not_vanish(present, ends):
     """Its first and last state are as asked, it never moves, and it is gone when the other one drives through its place."""
     template = scenario_of([straight(0, 0, 0, 0.0, TIME), straight(-25, 9, 0, 5.0, TIME)], TIME)
     arrays = (template.time, template.position, template.heading, template.speed)
-    encounter, asked = (
-        Encounter(template.vehicles, *arrays, "t"),
-        BoundaryStates(states(template, 0), states(template, -1)),
-    )
+    encounter = Encounter(template.vehicles, *arrays, "t")
+    asked = BoundaryStates(states(template, 0), states(template, -1))
     own = Checker.of_template(
         Situation.of(encounter), open_road(), asked, find_waits(encounter), FREE
     )

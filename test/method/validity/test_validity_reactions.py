@@ -67,9 +67,8 @@ def test_yielder_leaves_neither_early_nor_late(lag, kept):
     assert (found == []) == kept
     if not kept:
         assert found[0].vehicles == (1, 0)
-        assert ("leaves" if lag < 0.0 else "enters") in found[
-            0
-        ].message and "vehicle 1 has cleared" in found[0].message
+        assert ("leaves" if lag < 0.0 else "enters") in found[0].message
+        assert "vehicle 1 has cleared" in found[0].message
 
 
 def test_lag_bounds_are_parameters():

@@ -35,9 +35,8 @@ def test_crosswalk_leads_from_right_to_left(tmp_path, objects, area):
     (walk,) = network.others
     assert (walk.id, walk.crossing, sorted(walk.users)) == ("crosswalk 1.7", True, ["pedestrian"])
     assert np.allclose(walk.centre[[0, -1]], [[50.0, -4.0], [50.0, 4.0]], atol=1e-6)
-    assert np.allclose(walk.yaw, np.pi / 2.0) and shapely.Polygon(
-        walk.outline
-    ).area == pytest.approx(area)
+    assert np.allclose(walk.yaw, np.pi / 2.0)
+    assert shapely.Polygon(walk.outline).area == pytest.approx(area)
     assert walk.left[0, 0] < walk.right[0, 0]
 
 

@@ -31,10 +31,8 @@ def grid_agrees(road, area):
         for axis, index in ((0, columns), (1, rows))
     )
     reach = road.resolution * np.sqrt(2.0)
-    inside, outside = (
-        contains_xy(area.buffer(-reach), x, y),
-        ~contains_xy(area.buffer(reach), x, y),
-    )
+    inside = contains_xy(area.buffer(-reach), x, y)
+    outside = ~contains_xy(area.buffer(reach), x, y)
     assert inside.sum() > 1000 and outside.sum() > 1000
     assert road.drivable[inside].all()
     assert not road.drivable[outside].any()

@@ -15,10 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import find_places, lane_graph, read_network
 from scenario_gen.roads.vector.signs import kind_of_sign
 from scenario_gen.situation import clean_tracks
-from scenario_gen.types import (
-    NoteKind,
-    RuleKind,
-)
+from scenario_gen.types import NoteKind, RuleKind
 
 LINE = '<geometry s="0" x="{}" y="{}" hdg="{}" length="{}"><line/></geometry>'
 
@@ -264,9 +261,8 @@ def bridge(folder, suffix, height):
 @pytest.mark.parametrize("suffix", [".xodr", ".osm"])
 def test_bridge_traffic_meets_nobody_below(tmp_path, suffix):
     flat, above = (bridge(tmp_path, suffix, height) for height in (1.0, 8.0))
-    assert {lane.junction for lane in flat.lanes} == {"1"} and {
-        lane.junction for lane in above.lanes
-    } == {""}
+    assert {lane.junction for lane in flat.lanes} == {"1"}
+    assert {lane.junction for lane in above.lanes} == {""}
     tracks = clean_tracks(template(crossing()))
     assert meet(next(find_places(lane_graph(flat), tracks)).separation.tracks)
     with pytest.raises(

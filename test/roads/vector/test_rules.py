@@ -12,13 +12,7 @@ from support.map_builders import ARMS, at, FORMATS, HALF, write
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import places, read_network, RuleCheck
 from scenario_gen.situation import clean_tracks, find_conflicts
-from scenario_gen.types import (
-    Encounter,
-    NoteKind,
-    RuleKind,
-    Scenario,
-    Vehicle,
-)
+from scenario_gen.types import Encounter, NoteKind, RuleKind, Scenario, Vehicle
 
 DT = 0.1
 KINDS = {

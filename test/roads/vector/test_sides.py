@@ -47,11 +47,9 @@ def test_template_is_mirrored_on_other_side(crossroads):
         road, driven = road_and_template(path, encounter)
         assert road.lanes.traffic_side == side
         if own == side:
-            assert driven is encounter and not any(
-                note.kind is NoteKind.MIRRORED for note in road.lanes.notes
-            )
+            assert driven is encounter
+            assert not any(note.kind is NoteKind.MIRRORED for note in road.lanes.notes)
         else:
             assert road.lanes.notes[0] == Note.of(NoteKind.MIRRORED, road=road.name, side=side)
-            assert driven.name == "o" and np.array_equal(
-                driven.position, mirrored(encounter).position
-            )
+            assert driven.name == "o"
+            assert np.array_equal(driven.position, mirrored(encounter).position)

@@ -20,12 +20,7 @@ from scenario_gen.roads import (
 )
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.situation import clean_tracks
-from scenario_gen.types import (
-    Encounter,
-    NoteKind,
-    Vehicle,
-    VEHICLE_TYPES,
-)
+from scenario_gen.types import Encounter, NoteKind, Vehicle, VEHICLE_TYPES
 
 DRIVE = "bicycle,bus,car,motorcycle,truck,van"
 

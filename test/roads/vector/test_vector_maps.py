@@ -8,16 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from support.map_builders import (
-    ARM,
-    at,
-    FORMATS,
-    lanelet2,
-    lanes,
-    LIMIT,
-    opendrive,
-    write,
-)
+from support.map_builders import ARM, at, FORMATS, lanelet2, lanes, LIMIT, opendrive, write
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.xml_reader import parse_xml
@@ -97,12 +88,10 @@ def test_pose_in_a_lane_is_along(tmp_path):
 def test_part_is_cut_at_its_box(tmp_path, suffix):
     path = write(tmp_path, suffix)
     road = build_road(f"{path}#box=-30,-20,0,20")
-    assert road.drivable.shape == (200, 150) and road.origin.tolist() == pytest.approx(
-        [-30.0, -20.0]
-    )
-    assert len(road.entries) == 5 and {tuple(np.round(e, 1)) for e in road.entries} >= {
-        (-30.0, -1.8, 0.0)
-    }
+    assert road.drivable.shape == (200, 150)
+    assert road.origin.tolist() == pytest.approx([-30.0, -20.0])
+    assert len(road.entries) == 5
+    assert {tuple(np.round(e, 1)) for e in road.entries} >= {(-30.0, -1.8, 0.0)}
     network = read_network(path)
     junction = next(lane.junction for lane in network.lanes if lane.junction)
     assert (
