@@ -24,13 +24,6 @@ def with_zero_speeds(rows):
     return rows.assign(v=rows.v.where((rows.t < START_S + 5.0) | (rows.t >= START_S + 8.0), 0.0))
 
 
-def clock_time(rows, first):
-    """Times of the day as hhmmss.ss from `first` [s since midnight] on."""
-    seconds = (rows.t - START_S).round(2) + first
-    hours, minutes = seconds // 3600, seconds // 60 % 60
-    return hours * 10_000 + minutes * 100 + (seconds % 60)
-
-
 def nmea(values):
     whole = np.trunc(values)
     return 100.0 * whole + (values - whole) * 60.0
@@ -38,7 +31,6 @@ def nmea(values):
 
 READ = {  # name: rows as they are written, what a note says
     "a speed of 0": (with_zero_speeds(ROWS).drop(columns="h"), "speed column ignored"),
-    "hhmmss": (ROWS.assign(t=clock_time(ROWS, 31_953.0))[["t", "id", "x", "y"]], ""),
     "time of the day": (
         ROWS.assign(t=pd.to_datetime(ROWS.t.round(2), unit="s").dt.strftime("%H:%M:%S.%f"))[
             ["t", "id", "x", "y"]
@@ -141,12 +133,6 @@ def test_table_is_read_as_driven(tmp_path, rows, said):
 
 
 DOUBTED = {  # name: rows as they are written, the option that reads them right
-    "west is positive": (
-        degrees(ROWS)
-        .assign(lon=lambda own: -own.lon, heading_north_deg=north_degrees(ROWS))
-        .drop(columns="h"),
-        "--set log.columns=lon=-lon",
-    ),
     "minutes, west is positive": (
         degrees(ROWS)
         .assign(

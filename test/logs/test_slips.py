@@ -41,10 +41,6 @@ def numbered(rows):
     return own.assign(type=own.vehicle_id.map({"a": 1, "b": 2, "w": 3}))
 
 
-def mirrored(rows):
-    return rows.assign(y_m=-rows.y_m, yaw_deg=np.where(rows.vehicle_id == "a", 0.0, -90.0))
-
-
 def nmea(rows):
     out = geographic(rows)
     for name in ("lat_deg", "lon_deg"):
@@ -100,7 +96,6 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "held fixes": (held, "", "position repeated while the vehicle moves"),
     "before 1970": (lambda rows: rows.assign(t_s=rows.t_s - 1006.0), "", "6 s are added to all"),
     "minutes": (lambda rows: rows.assign(t_min=rows.pop("t_s") / 60.0), "", ""),
-    "a left-handed frame": (mirrored, "y=-y_m,heading=-yaw_deg", ""),
     "the front's position": (lambda rows: ahead(rows, 2.4), "point=front", ""),
     "the rear axle's position": (lambda rows: ahead(rows, -1.44), "point=rear_axle", ""),
     "dogs": (with_kind, "", "1 × animal.dog.0007"),
@@ -111,7 +106,7 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
         "x=Ost X [m],y=Nord [y]",
         "",
     ),
-    "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
+    "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "y (m)"}), "", ""),
     "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "like feet"),
     "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m × 0 m"),
     "length and width swapped": (lambda rows: sized(rows, 1.8, 4.5), "", "it looks swapped"),
@@ -126,13 +121,6 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "bars": (plain, "", None, {"sep": "|"}),
     "spaces between fields": (plain, "", None, {"sep": " "}),
     "headings that fit": (with_headings, "", None),
-    "units in brackets": (
-        lambda rows: plain(rows).rename(
-            columns={"t": "Time [s]", "x": "x (m)", "y": "y (m)", "speed": "Speed [m/s]"}
-        ),
-        "",
-        None,
-    ),
     "no speed": (
         lambda rows: plain(rows).drop(columns="speed"),
         "",
@@ -371,10 +359,6 @@ def test_files_without_ids_are_vehicles(tmp_path):
 
 
 REFUSED = {  # name: what is changed, what is said, how the file is written
-    "ms since 1970": (
-        lambda rows: rows.assign(t_s=((rows.t_s + 1.66e9) * 1000).round()),
-        "looks like ms: --set log.columns=time=t_s:ms",
-    ),
     "ids that number the rows": (
         lambda rows: rows.rename(columns={"vehicle_id": "tracker"}).assign(id=range(len(rows))),
         "--set log.columns=vehicle=tracker",

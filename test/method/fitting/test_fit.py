@@ -12,11 +12,12 @@ from support.lengths import LOGS
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.fitting.placement import place_given
 from scenario_gen.method.fitting.state_check import refuse_misfits
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.situation import find_conflicts
+from scenario_gen.situation import find_conflicts, Situation
 from scenario_gen.types import Encounter, Motion, Request, Vehicle
 from scenario_gen.types.fit import Segmentation
 from scenario_gen.types.road import Road
@@ -285,8 +286,6 @@ def test_scale_out_of_range_is_refused():
         driven(straight(0.0, 0.0, 0.0), np.full(150, 12.0)),
         driven(straight(-20.0, 0.0, 0.0), np.full(150, 12.0)),
     )
-    from scenario_gen.roads import RoadConfig
-
     road = build_road("straight", encounter, RoadConfig(arm_length=60.0))
     with pytest.raises(RefusedError, match=r"scale 0\.5\d; at least 0\.8 is accepted"):
         fit_template(encounter, every(encounter), road)
@@ -351,6 +350,21 @@ def test_returning_vehicle_turns_with_its_start():
     assert [f.scale for f in fit.fitted] == pytest.approx([1.0, 1.0], abs=0.01)
     half_way = fit.fitted[0].path[len(fit.fitted[0].path) // 2]
     assert half_way[:2] == pytest.approx([100.0 - 2.0 * 59.4 / (2.0 * np.pi), 100.0], abs=0.5)
+
+
+@pytest.mark.parametrize(("chord", "method"), [(1.9, "turned as its start"), (2.1, "similarity")])
+def test_short_chord_has_no_direction(chord, method):
+    """Of a drive of 59.4 m on nearly a whole circle, whose end is requested where it was recorded."""
+    speed, radius = np.full(100, 6.0), (59.4 + chord) / (2.0 * np.pi)
+    circle = turn(0.0, 0.0, 0.0, 0.0, 59.4 / radius, radius)
+    encounter = encounter_of(driven(circle, speed), driven(straight(40.0, 30.0, 0.0), speed))
+    ends = np.concatenate((encounter.position, encounter.heading[..., None]), axis=-1) + 50.0
+    ends[..., 2] -= 50.0
+    states = np.concatenate((ends, encounter.speed[..., None]), axis=-1)
+    road = grid(np.ones((1000, 1000), dtype=bool))
+    starts, goals = states[:, 0].copy(), states[:, -1].copy()
+    placement, _ = place_given(Situation.of(encounter), road, FittingConfig(), starts, goals)
+    assert placement.notes[0].values["method"].startswith(method)
 
 
 def test_waiting_vehicle_cannot_be_sent_away():

@@ -241,18 +241,6 @@ def test_creeping_under_standstill_is_no_stand():
     ]
 
 
-def test_waiting_vehicle_never_moves():
-    standing, other = straight(0, 0, 0, 0, TIME), straight(-50, 20, 0, 5, TIME)
-    waits = (Wait(0, 0.0, 20.0),)
-    scenario = scenario_of([standing, other], TIME)
-    asked = asked_of(scenario)
-    assert causes(scenario, requested=asked, waits=waits) == []
-    twitch = np.interp(TIME, [0, 15, 15.2, 15.6, 15.8, 20], [0, 0, 0.2, -0.2, 0, 0])
-    position = standing[0] + np.stack((np.cumsum(twitch) * 0.1, 0 * TIME), axis=-1)
-    moving = scenario_of([(position, standing[1], np.abs(twitch)), other], TIME)
-    assert Cause.STOP_NOT_KEPT in causes(moving, requested=asked, waits=waits)
-
-
 def test_unchecked_claims_are_named():
     checker = Checker(None, None, None, None)
     assert [sentence.split(":")[0] for sentence in checker.not_applicable] == [

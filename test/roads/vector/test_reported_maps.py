@@ -234,27 +234,23 @@ def bridge(folder, suffix, height):
             road(both, 1, (-80, 0, 0), 160),
             road(both, 2, (0, -80, math.pi / 2.0), 160, elevation=height),
         )
-    nodes, ways, relations = "", "", ""
-    for k, (turned, z) in enumerate(((False, 0.0), (True, height))):
-        for j, aside in enumerate((-3.5, 0.0, 3.5)):
-            for i, along in enumerate((-80.0, 80.0)):
-                x, y = (-aside, along) if turned else (along, aside)
-                tags = "".join(
-                    f'<tag k="{key}" v="{value}"/>'
-                    for key, value in (("local_x", x), ("local_y", y), ("ele", z))
-                )
-                nodes += f'<node id="{100 * k + 10 * j + i + 1}" lat="0" lon="0">{tags}</node>'
-            ways += f'<way id="{1000 + 10 * k + j}"><nd ref="{100 * k + 10 * j + 1}"/><nd ref="{100 * k + 10 * j + 2}"/></way>'
-        for j in (0, 1):
-            sides = (
-                (f"{1000 + 10 * k + 1}", f"{1000 + 10 * k}"),
-                (f"{1000 + 10 * k + 2}", f"{1000 + 10 * k + 1}"),
-            )[j]
-            members = "".join(
-                f'<member type="way" role="{r}" ref="{ref}"/>'
-                for r, ref in zip(("left", "right"), sides, strict=True)
-            )
-            relations += f'<relation id="{2000 + 10 * k + j}">{members}<tag k="type" v="lanelet"/></relation>'
+    nodes = ways = relations = ""
+    for k, (z, yaw) in enumerate(
+        zip((0.0, 0.0, height, height), (0.0, 2.0, 1.0, 3.0), strict=True)
+    ):
+        ahead = np.array([math.cos(yaw * math.pi / 2.0), math.sin(yaw * math.pi / 2.0)])
+        number = 4 * k
+        for aside in (0.0, -3.5):
+            for along in (-80.0, 80.0):
+                number += 1
+                x, y = along * ahead + aside * np.array([-ahead[1], ahead[0]])
+                place = {"local_x": x, "local_y": y, "ele": z}
+                tags = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in place.items())
+                nodes += f'<node id="{number}" lat="0" lon="0">{tags}</node>'
+            ways += f'<way id="{number}"><nd ref="{number - 1}"/><nd ref="{number}"/></way>'
+        sides = (("left", number - 2), ("right", number))
+        members = "".join(f'<member type="way" role="{r}" ref="{ref}"/>' for r, ref in sides)
+        relations += f'<relation id="{k + 1}">{members}<tag k="type" v="lanelet"/></relation>'
     return read_network(write(folder, ".osm", f"<osm>{nodes}{ways}{relations}</osm>"))
 
 
