@@ -9,11 +9,10 @@ import shutil
 from hypothesis import given, strategies
 import numpy as np
 import pytest
-from support.killed import killed_in
 from synthetic_archive import read_planted
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders import sha256_of
+from scenario_gen.base.folders import sha256_of, TEMPORARY
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.grouping import group, grouped, label
@@ -77,6 +76,13 @@ def test_reactions_stand_in_the_table(corpus):
     assert ["follow"] in kinds["following"] and not any(
         "follow" in found for found in kinds["oncoming"]
     )
+
+
+def killed_in(folder):
+    """Leave the folder of intermediate files of a process that was killed."""
+    own = folder / f"{TEMPORARY}killed"
+    own.mkdir(parents=True)
+    (own / "torn.parquet").write_text("torn")
 
 
 def test_missing_files_are_made_again(archive, corpus, tmp_path):
