@@ -103,17 +103,15 @@ def test_such_a_set_is_valid(bag):
     assert sum(len(each.verdicts) for each in sets) == 4 == sum(each.valid for each in sets)
 
 
-def test_vehicle_waiting_for_nobody_is_refused(tmp_path):
-    words = (str(bundled("b")), "--road", "t_intersection", "--ego", "1", "--count", "1")
+@pytest.mark.parametrize(
+    ("ego", "said"),
+    [(["--ego", "1"], "vehicle 1 waits for nobody"), ([], "name the vehicle that")],
+)
+def test_unsuitable_ego_is_refused(tmp_path, ego, said):
+    words = (str(bundled("b")), "--road", "t_intersection", "--count", "1", *ego)
     done = generated(tmp_path / "none", *words)
-    output = " ".join(str(done.exception or done.output).split())
-    assert done.exit_code != 0 and "for testing ego 1: vehicle 1 waits for nobody" in output
-
-
-def test_without_an_ego_it_is_refused(tmp_path):
-    done = generated(tmp_path / "none", str(bundled("b")), "--road", "t_intersection")
     assert done.exit_code != 0
-    assert "name the vehicle that the planner replaces" in str(done.exception)
+    assert said in " ".join(str(done.exception or done.output).split())
 
 
 def test_committed_vehicle_does_not_rescue_ego():

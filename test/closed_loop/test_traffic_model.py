@@ -112,8 +112,10 @@ def test_jerk_is_bounded_unless_forced(seed, step, jerk, vehicles):
     """On certified motions of one speed, which have no jerk of their own; whatever the ego does."""
     scenario = replace(following(12.0, 10.0, vehicles) if seed % 2 else crossing(), seed=seed)
     ego = seed % len(scenario.vehicles)
-    loop = ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk))
-    planner = Anything(seed)
+    loop, planner = (
+        ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk)),
+        Anything(seed),
+    )
     planner.reset(loop.task())
     drive = [loop.start()]
     for _ in range(int(12 / step)):
@@ -325,12 +327,14 @@ def test_hardest_braking_is_bounded_or_counted(seed, gain):
     """The ego does anything, or speeds up or brakes for 3 s."""
     scenario = draw_scenario(seed)
     ego = seed % len(scenario.vehicles)
-    planner = Anything(seed) if gain is None else Braking(-gain)
-    loop = ClosedLoop(scenario, ego)
+    planner, loop = Anything(seed), ClosedLoop(scenario, ego)
     planner.reset(loop.task())
     drive = [loop.start()]
-    while drive[-1].step < len(scenario.time) + 30:
-        drive.append(loop.step(drive[-1], planner.act(loop.observe(drive[-1]))))
+    while (step := drive[-1].step) < len(scenario.time) + 30:
+        command = planner.act(loop.observe(drive[-1]))
+        if gain is not None:
+            command = Command(gain * (step < 30), 0.0)
+        drive.append(loop.step(drive[-1], command))
     gained = np.diff([state.vehicles[:, 3] for state in drive], axis=0) / 0.1
     stays = np.array([state.present for state in drive])
     hardest = -loop.parameters.strongest - MODEL.braking_tolerance_mps / 0.1 - 1e-9
@@ -338,19 +342,6 @@ def test_hardest_braking_is_bounded_or_counted(seed, gain):
     hard[:, ego] = False
     counted = np.diff([state.forced for state in drive])
     assert (hard.sum(axis=1) <= counted).all()
-
-
-class Braking:
-    """Brakes by so much [m/s²] for 3 s, then keeps its speed."""
-
-    def __init__(self, braking):
-        self.braking = braking
-
-    def reset(self, task):
-        """Begin."""
-
-    def act(self, seen):
-        return Command(-self.braking * (seen.time < 3.0), 0.0)
 
 
 @pytest.mark.parametrize("ahead", [0.5, 1.0, 1.5])

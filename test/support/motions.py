@@ -6,7 +6,7 @@
 import numpy as np
 
 from scenario_gen.base.road_users import Dynamics
-from scenario_gen.method.validity import Limits
+from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.types import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
@@ -33,6 +33,17 @@ def scenario_of(tracks, time, vehicles=None):
     acceleration = np.concatenate((rate, rate[:, -1:]), axis=1)
     vehicles = vehicles or tuple(Vehicle(f"v{i}") for i in range(len(tracks)))
     return Scenario(vehicles, time, position, heading, speed, acceleration)
+
+
+def verdict_of(scenario, **known):
+    """The checker's verdict on one scenario; what is not known is not checked, and nothing is limited."""
+    given = dict.fromkeys(("road", "requested", "conflicts", "waits")) | {"limits": FREE} | known
+    (verdict,) = Checker(**given).check([scenario])
+    return verdict
+
+
+def causes_of(scenario, **known):
+    return [violation.cause for violation in verdict_of(scenario, **known).violations]
 
 
 def straight(x, y, yaw, speed, time):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.motions import FREE, open_road, scenario_of, straight
+from support.motions import causes_of, FREE, open_road, scenario_of, straight
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, containment, dynamics, Limits
@@ -29,16 +29,8 @@ def states(scenario, k):
     return np.column_stack((scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]))
 
 
-def causes(scenario, **known):
-    given = {
-        "road": None,
-        "requested": None,
-        "conflicts": None,
-        "waits": None,
-        "limits": Limits(),
-    } | known
-    (verdict,) = Checker(**given).check([scenario])
-    return [violation.cause for violation in verdict.violations]
+def causes(scenario, limits=Limits(), **known):
+    return causes_of(scenario, limits=limits, **known)
 
 
 @pytest.mark.parametrize("column", [0, 1, 3])

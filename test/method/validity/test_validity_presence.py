@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import shapely
 from support.lengths import LONG
-from support.motions import FREE, open_road, scenario_of, straight, wander
+from support.motions import FREE, open_road, scenario_of, straight, verdict_of, wander
 from support.oracle import boxes_beyond, overlapping
 
 from scenario_gen.base.road_users import Dynamics
-from scenario_gen.method.validity import Checker, collision
+from scenario_gen.method.validity import collision
 from scenario_gen.situation import Wait
 from scenario_gen.types import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork, Obstacle
@@ -34,15 +34,8 @@ def together(present):
     )
 
 
-def causes(scenario, **known):
-    given = {
-        "road": ROAD,
-        "requested": None,
-        "conflicts": None,
-        "waits": None,
-        "limits": FREE,
-    } | known
-    (verdict,) = Checker(**given).check([scenario])
+def causes(scenario, road=ROAD, **known):
+    verdict = verdict_of(scenario, road=road, **known)
     return [violation.cause for violation in verdict.violations], verdict
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
-from support.motions import FREE, scenario_of, straight, wander
+from support.motions import causes_of, FREE, scenario_of, straight, wander
 
-from scenario_gen.method.validity import allowed_gap, Checker, Limits
+from scenario_gen.method.validity import allowed_gap, Limits
 from scenario_gen.method.validity.dynamics import Check, MotionLimits, worst_excess
 from scenario_gen.method.validity.template_checks import clearance_violations, least_gaps
 from scenario_gen.situation import Abreast, MAX_CLEARANCE_CHANGE_M, Wait
@@ -138,12 +138,6 @@ def test_yielder_gap_differs_by_its_share(gap, low, high):
     assert allowed_gap(edge, Limits()) == pytest.approx((low, high))
 
 
-def verdict(scenario, requested=None, **known):
-    given = {"road": None, "conflicts": None, "waits": None, "limits": FREE} | known
-    (found,) = Checker(requested=requested, **given).check([scenario])
-    return [violation.cause for violation in found.violations]
-
-
 @pytest.mark.parametrize(("end", "row"), [("start", [20, 100]), ("end", [0, 80])])
 @pytest.mark.parametrize("off", [-1.0, 1.0])
 def test_arrival_between_samples_is_tolerated(end, row, off):
@@ -160,7 +154,7 @@ def test_arrival_between_samples_is_tolerated(end, row, off):
             changed = asked[end].copy()
             changed[0, column] += off * error
             requested = BoundaryStates(**(asked | {end: changed}))
-            assert verdict(scenario, requested, limits=limits) == fault
+            assert causes_of(scenario, requested=requested, limits=limits) == fault
 
 
 @pytest.mark.parametrize("first", range(20, 60, 3))
@@ -175,7 +169,7 @@ def test_stand_of_a_second_is_one(first):
         shorter = track[2].copy()
         shorter[first + samples : first + 11] = 1.0
         scenario = scenario_of([(*track[:2], shorter)], TIME)
-        assert verdict(scenario, waits=[Wait(0, 2.0, 3.0)]) == fault
+        assert causes_of(scenario, waits=[Wait(0, 2.0, 3.0)]) == fault
 
 
 @pytest.mark.parametrize("column", [0, 3])
@@ -188,7 +182,9 @@ def test_state_at_its_tolerance_is_met(column):
         start[0, column] = error
         assert abs(start[0, column] - states[0][0, column]) > 0.1
         limits = replace(FREE, position_tolerance=0.1, speed_tolerance=0.1)
-        assert verdict(scenario, BoundaryStates(start, states[1]), limits=limits) == fault
+        assert (
+            causes_of(scenario, requested=BoundaryStates(start, states[1]), limits=limits) == fault
+        )
 
 
 def test_stand_within_tolerance_is_throughout():
@@ -198,9 +194,9 @@ def test_stand_within_tolerance_is_throughout():
     asked = BoundaryStates(np.array([[0.7, 0.0, 0.0, 0.0]]), np.array([[0.8, 0.0, 0.0, 0.0]]))
     waits = [Wait(0, 0.0, 10.0)]
     assert asked.end[0, 0] - asked.start[0, 0] > 0.1
-    assert verdict(scenario_of([stands], TIME), asked, waits=waits) == []
+    assert causes_of(scenario_of([stands], TIME), requested=asked, waits=waits) == []
     moving = scenario_of([(*stands[:2], twitch)], TIME)
-    assert verdict(moving, asked, waits=waits) == [Cause.STOP_NOT_KEPT]
+    assert causes_of(moving, requested=asked, waits=waits) == [Cause.STOP_NOT_KEPT]
 
 
 @pytest.mark.parametrize("offset", [-2.5, 2.5])
@@ -223,5 +219,5 @@ def test_follower_falls_back_by_its_share(share, longest):
             straight(0.0, 0.0, 0.0, 8.0, TIME),
             straight(-4.8 - 8.0 * gap, 0.0, 0.0, 8.0, TIME),
         ]
-        found = verdict(scenario_of(tracks, TIME), limits=limits, reactions=[edge])
+        found = causes_of(scenario_of(tracks, TIME), limits=limits, reactions=[edge])
         assert found == [Cause.REACTION] * (gap > longest)
