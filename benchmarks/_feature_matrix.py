@@ -29,8 +29,9 @@ def pair_similarities(
 ) -> list[PairSimilarity]:
     """Compare all pairs: template (N, T, D) and generated (S, N, T, D), see `pair_similarity`."""
     target, series = np.moveaxis(template, -1, -2), np.moveaxis(generated, -1, -2)
+    unit = np.arange(len(series))
     return [
-        pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance)
+        pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance, unit)
         for a, b in combinations(range(template.shape[0]), 2)
     ]
 

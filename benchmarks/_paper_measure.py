@@ -17,12 +17,9 @@ from benchmarks._reference_sets import (
     without_changepoints,
 )
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.evaluation import (
-    Bootstrap,
-    mean_correlation,
-    mean_error,
-)
-from scenario_gen.method.sampling import Features, Observations, Regression
+from scenario_gen.method.evaluation.distributions import Bootstrap
+from scenario_gen.method.evaluation.similarity import mean_correlation, mean_error
+from scenario_gen.method.sampling.gp import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.situation import find_waits

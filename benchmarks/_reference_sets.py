@@ -14,7 +14,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import evaluate_scenarios, MEASURED_SCENARIOS
+from scenario_gen.method.evaluation.evaluate import evaluate_scenarios, MEASURED_SCENARIOS
 from scenario_gen.numerics import Ints
 from scenario_gen.situation import Situation
 from scenario_gen.types import Evaluation, GenerationResult, ScenarioSet, Segmentation, WITH

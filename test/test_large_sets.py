@@ -13,8 +13,7 @@ from support.given import answer, Given
 
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.evaluation import MEASURED_SCENARIOS
-from scenario_gen.method.evaluation.evaluate import measured
+from scenario_gen.method.evaluation.evaluate import measured, MEASURED_SCENARIOS
 from scenario_gen.method.sampling import sampler
 from scenario_gen.method.sampling.sampler import (
     BLOCK_CANDIDATES,

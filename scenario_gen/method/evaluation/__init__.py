@@ -6,17 +6,12 @@
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.distributions import (
-    Bootstrap,
     clustered_wilson,
     paired_difference,
     wilson,
 )
 from scenario_gen.method.evaluation.dtw import mean_feature
-from scenario_gen.method.evaluation.evaluate import (
-    evaluate,
-    evaluate_scenarios,
-    MEASURED_SCENARIOS,
-)
+from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios
 from scenario_gen.method.evaluation.law import measures_in
 from scenario_gen.method.evaluation.measures import (
     criticality,
@@ -25,10 +20,6 @@ from scenario_gen.method.evaluation.measures import (
 )
 from scenario_gen.method.evaluation.metrics import MetricGroup
 from scenario_gen.method.evaluation.samples import common_motion, replay, Samples, Template
-from scenario_gen.method.evaluation.similarity import (
-    mean_correlation,
-    mean_error,
-)
 from scenario_gen.method.evaluation.time_shift import (
     free_acceleration,
     MAX_ACCELERATION_MPS2,
@@ -41,9 +32,7 @@ from scenario_gen.method.evaluation.time_shift import (
 __all__ = [
     "MAX_ACCELERATION_MPS2",
     "MAX_BRAKING_MPS2",
-    "MEASURED_SCENARIOS",
     "STANDSTILL_MPS",
-    "Bootstrap",
     "EvaluationConfig",
     "MetricGroup",
     "Samples",
@@ -57,8 +46,6 @@ __all__ = [
     "evaluate_scenarios",
     "footprint_distance",
     "free_acceleration",
-    "mean_correlation",
-    "mean_error",
     "mean_feature",
     "measures_in",
     "min_time_shift",

@@ -24,6 +24,7 @@ JERK_SMOOTHING_S = 0.5
 
 MAX_BIN_COUNT = 20_000_000  # over all samples
 MAX_SPAN_BIN_COUNT = 20_000  # of one quantity: gaps of 20 km; each bin has all resamples
+GRID_COUNT = 513  # values at which distribution functions are compared
 ROUNDING_SHARE = 1e-6
 """A value that is this share of a bin below an edge counts as above it, against rounding."""
 
@@ -115,16 +116,13 @@ class Comparison:
             )
 
 
-def compare(
-    quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513
-) -> Comparison:
+def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats]) -> Comparison:
     """Compare the values of one quantity; bins are `quantity.bin_width` wide and aligned at zero.
 
     Args:
         quantity: what the values are, and in which unit.
         template: (n,) its values in the template.
         samples: its values in each sample, (n,) each, of any number.
-        points: numbers of values at which the cumulative distributions are given, at most.
 
     Raises:
         InputError: the values are so different that there would be too many bins.
@@ -160,7 +158,7 @@ def compare(
             np.bincount(bin_of(values) - first, minlength=last - first + 1), dtype=np.float64
         )
 
-    grid = np.linspace(everything.min(), everything.max(), points)
+    grid = np.linspace(everything.min(), everything.max(), GRID_COUNT)
     middle = 0.5 * (
         grid[1:] + grid[:-1]
     )  # the distribution function of an interval is taken in its middle
@@ -232,7 +230,8 @@ class Bootstrap:
         """Draw the weights; the same seed gives the same weights.
 
         Args:
-            unit: (S,) samples with the same number depend on each other and are drawn together.
+            unit: (S,) samples with the same number depend on each other and are drawn together;
+                S >= 1.
             resamples: B.
             level: confidence level.
             seed: of the draws.
@@ -241,11 +240,7 @@ class Bootstrap:
         generator = np.random.Generator(
             np.random.PCG64(np.random.SeedSequence([seed, len(unit), resamples]))
         )
-        drawn = (
-            generator.integers(len(units), size=(resamples, len(units)))
-            if len(units)
-            else np.zeros((resamples, 0), np.int64)
-        )
+        drawn = generator.integers(len(units), size=(resamples, len(units)))
         times = np.zeros((resamples, len(units)))
         np.add.at(times, (np.arange(resamples)[:, None], drawn), 1.0)
         return cls(times[:, member], level, member)
@@ -266,7 +261,7 @@ class Bootstrap:
         """
         samples = self.weights.shape[1]
         value = float(statistic(np.ones((1, samples)))[0])
-        if not self.unit.size or self.unit.max() < 1 or not np.isfinite(value):
+        if self.unit.max() < 1 or not np.isfinite(value):
             return Interval(value)
         values = statistic(self.weights)
         values = values[np.isfinite(values)]

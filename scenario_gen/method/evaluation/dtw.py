@@ -18,6 +18,7 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.kernels import F, F2, F3, I, kernel, OUT1, OUT2
 
 Distance = Literal["euclidean", "manhattan", "angle"]
+MAX_NUMBERS_COUNT = 400_000  # of feature matrices in memory at once
 _TURN: dict[Distance, float] = {"euclidean": 0.0, "manhattan": np.inf, "angle": 2.0 * np.pi}
 
 
@@ -74,7 +75,7 @@ def _feature_rows(
                 row[j] = 1.0 if value > 1.0 else value
 
 
-def feature_extents(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floats:
+def feature_extents(a: Floats, b: Floats, distance: Distance) -> Floats:
     """Return the least and largest pairwise distance (S, 2) of a (S, D, n) and b (S, D, m)."""
     a, b, extents = _within(a, distance), _within(b, distance), np.empty((a.shape[0], 2))
     for s in range(a.shape[0]):
@@ -82,9 +83,7 @@ def feature_extents(a: Floats, b: Floats, distance: Distance = "euclidean") -> F
     return extents
 
 
-def feature_rows(
-    a: Floats, b: Floats, extents: Floats, rows: range, distance: Distance = "euclidean"
-) -> Floats:
+def feature_rows(a: Floats, b: Floats, extents: Floats, rows: range, distance: Distance) -> Floats:
     """Return rows of the feature matrices of S samples, (S, len(rows)·m), from their extents.
 
     A set of long encounters does not fit in memory at once, so what sums over matrices goes
@@ -97,7 +96,7 @@ def feature_rows(
     return out
 
 
-def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floats:
+def mean_feature(a: Floats, b: Floats, distance: Distance) -> Floats:
     """Return the mean (n, m) of the feature matrices of S samples a (S, D, n) and b (S, D, m).
 
     Source: paper V-B, Fig. 5.
@@ -112,9 +111,9 @@ def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floa
     return mean
 
 
-def blocks(n: int, width: int, budget: int = 400_000) -> list[range]:
-    """Cut n rows of `width` numbers into ranges of at most `budget` numbers, at least one row."""
-    step = max(1, budget // max(width, 1))
+def blocks(n: int, width: int) -> list[range]:
+    """Cut n rows of `width` numbers into ranges of at most MAX_NUMBERS_COUNT, at least one row."""
+    step = max(1, MAX_NUMBERS_COUNT // max(width, 1))
     return [range(first, min(n, first + step)) for first in range(0, n, step)]
 
 

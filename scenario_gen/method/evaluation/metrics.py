@@ -116,10 +116,10 @@ def _similarity(samples: Samples) -> Estimates:
     """
     unit = samples.pooled.unit
     compared = {
-        "position": [pair.similarity(0, "euclidean", unit=unit) for pair in samples.pairs],
-        "speed": [pair.similarity(1, "manhattan", unit=unit) for pair in samples.pairs],
+        "position": [pair.similarity(0, "euclidean", unit) for pair in samples.pairs],
+        "speed": [pair.similarity(1, "manhattan", unit) for pair in samples.pairs],
         "heading": [
-            pair.similarity(2, "angle", MIN_HEADING_SPREAD_RAD, unit) for pair in samples.pairs
+            pair.similarity(2, "angle", unit, MIN_HEADING_SPREAD_RAD) for pair in samples.pairs
         ],
     }
     if not any(pair.template[2] for pair in compared["heading"]):
@@ -144,7 +144,7 @@ def _turn_kept(samples: Samples) -> Floats:
         ]
         for m in samples.motions
     ]
-    return np.array([np.mean(row) for row in kept])
+    return np.asarray(np.mean(kept, axis=1))
 
 
 _E = "‖mean feature matrix − recording's‖ / ‖recording's‖, of"
@@ -377,7 +377,7 @@ METRICS = Registry[MetricGroup](
 """All groups of metrics in order of computation, with those of installed packages."""
 
 
-def catalogue(config: EvaluationConfig = EvaluationConfig()) -> tuple[Metric, ...]:
+def catalogue(config: EvaluationConfig) -> tuple[Metric, ...]:
     """Return all metrics in the order in which they are shown, by heading.
 
     Raises:

@@ -113,7 +113,7 @@ class Samples:
     def pooled(self) -> Bootstrap:
         """The bootstrap of at most MAX_UNIT_COUNT units: the cost of E grows with their square."""
         unit, config = self.bootstrap.unit, self.template.config
-        size = -(-(int(unit.max(initial=0)) + 1) // MAX_UNIT_COUNT)
+        size = -(-(int(unit.max()) + 1) // MAX_UNIT_COUNT)
         return (
             self.bootstrap
             if size == 1
@@ -158,7 +158,7 @@ class VehiclePair:
     samples: tuple[Floats, ...]
 
     def similarity(
-        self, k: int, distance: Distance, least: float = 0.0, unit: Ints | None = None
+        self, k: int, distance: Distance, unit: Ints, least: float = 0.0
     ) -> PairSimilarity:
         """Compare one of the three arrays, as `pair_similarity` does."""
         target, series = self.template[k], self.samples[k]
@@ -166,7 +166,7 @@ class VehiclePair:
             target, series = target[..., None], series[..., None]
         target, series = np.moveaxis(target, -1, -2), np.moveaxis(series, -1, -2)
         return pair_similarity(
-            (target[0], target[1]), (series[:, 0], series[:, 1]), distance, least, unit
+            (target[0], target[1]), (series[:, 0], series[:, 1]), distance, unit, least
         )
 
 

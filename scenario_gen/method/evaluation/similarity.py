@@ -70,8 +70,8 @@ def pair_similarity(
     template: tuple[Floats, Floats],
     generated: tuple[Floats, Floats],
     distance: Distance,
+    unit: Ints,
     least: float = 0.0,
-    unit: Ints | None = None,
 ) -> PairSimilarity:
     """Compare the feature matrices of one pair of vehicles.
 
@@ -79,23 +79,20 @@ def pair_similarity(
         template: series of the two vehicles, (D, T) each.
         generated: series of the two vehicles in S samples, (S, D, T) each.
         distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
+        unit: (S,) the number, from 0, of the unit of each sample.
         least: a template whose distances spread by less counts as constant: scaled to [0, 1] it
             would show its noise.
-        unit: (S,) the number, from 0, of the unit of each sample; None: each sample is a unit.
     """
     samples, _, steps = generated[0].shape
-    unit = np.arange(samples) if unit is None else unit
     order = np.argsort(unit, kind="stable")
     begins = np.flatnonzero(np.diff(unit[order], prepend=-1))
     a, b = (np.ascontiguousarray(series[order]) for series in generated)
     left, right = (np.ascontiguousarray(series)[None] for series in template)
-    extents, template_extents = (
-        feature_extents(a, b, distance),
-        feature_extents(left, right, distance),
-    )
-    units = int(unit.max()) + 1 if samples else 0
+    extents = feature_extents(a, b, distance)
+    template_extents = feature_extents(left, right, distance)
+    units = int(unit.max()) + 1
     gram, cross, total = np.zeros((units, units)), np.zeros(units), np.zeros(units)
-    count = np.bincount(unit, minlength=units).astype(np.float64)
+    count = np.bincount(unit).astype(np.float64)
     first = second = 0.0
     if template_extents[0, 1] - template_extents[0, 0] < least:
         return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
@@ -135,12 +132,12 @@ def _mean_over_pairs(values: list[Floats]) -> Floats:
     )
 
 
-def displacements(position: Floats, counted: Bools | None = None) -> Floats:
+def displacements(position: Floats, counted: Bools) -> Floats:
     """Return (S, S): mean distance in metres between samples r and s, over vehicles and instants.
 
     Args:
         position: (S, N, T, 2) metres, at the same share of each sample's duration.
-        counted: (N, T) vehicles and instants that count; None: all.
+        counted: (N, T) vehicles and instants that count.
     """
     samples = position.shape[0]
     table = np.zeros((samples, samples))
@@ -162,19 +159,17 @@ def diversity(table: Floats, weights: Floats) -> Floats:
         return np.asarray(total / pairs)
 
 
-def _mean(distance: Floats, counted: Bools | None) -> Floats:
+def _mean(distance: Floats, counted: Bools) -> Floats:
     """Mean (S,) of distances (S, N, T) over the vehicles and instants that count."""
     return np.asarray(
-        distance.mean(axis=(1, 2))
-        if counted is None or counted.all()
-        else distance[:, counted].mean(axis=1)
+        distance.mean(axis=(1, 2)) if counted.all() else distance[:, counted].mean(axis=1)
     )
 
 
-def displacement_to(position: Floats, target: Floats, counted: Bools | None = None) -> Floats:
+def displacement_to(position: Floats, target: Floats, counted: Bools) -> Floats:
     """Return the mean distance (S,) [m] of samples (S, N, T, 2) to a target (N, T, 2) (ADE).
 
-    Only vehicles and instants in `counted` (N, T) enter; None: all.
+    Only vehicles and instants in `counted` (N, T) enter.
 
     Source: the average displacement error (Pellegrini et al. 2009).
     """

@@ -132,7 +132,7 @@ def wanted_speeds(route: Curve, station: Floats, top: float, *, stops: bool) -> 
     return np.asarray(wanted)
 
 
-def free_acceleration(speed: float, wanted: float, most: float = MAX_ACCELERATION_MPS2) -> float:
+def free_acceleration(speed: float, wanted: float, most: float) -> float:
     """Return the free-road acceleration [m/s²] towards a desired speed (IDM), braking softly."""
     over = speed / max(wanted, 0.1)
     return max(most * (1.0 - over * over), -MAX_BRAKING_MPS2)

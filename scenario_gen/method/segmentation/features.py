@@ -143,10 +143,10 @@ def driving_features(
     """
     vehicles, dt = encounter.vehicles, encounter.dt
     features = np.zeros((*encounter.speed.shape, 3))
-    for i, (first, last) in enumerate(encounter.present.tolist()):
-        present = slice(first, last + 1)
+    for i, vehicle in enumerate(vehicles):
+        present = encounter.present_slice(i)
         position, speed = encounter.position[i, present], encounter.speed[i, present]
-        moves = moving(speed, dt, vehicles[i].kind.waits_below)
+        moves = moving(speed, dt, vehicle.kind.waits_below)
         features[i, present, 0] = longitudinal_acceleration(speed, dt, speed_window)
         features[i, present, 1] = lateral_acceleration(position, dt, turn_window) * moves
         features[i, present, 2] = moves

@@ -180,9 +180,7 @@ def on_trends(
 
     See `trends`; `max_rate` limits their number.
     """
-    trends = Trends.of(
-        encounter.position, encounter.speed, encounter.dt, encounter.vehicles, encounter.present
-    )
+    trends = Trends.of(encounter)
     chance = config.significance_level
     min_gain, sure_gain = trends.threshold(chance), trends.threshold(chance * chance)
     reach = round(config.settle / encounter.dt)

@@ -11,7 +11,6 @@ course best. Changepoints that the fit does not need are dropped. Places with so
 probability of a changepoint are added if the fit needs them.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,7 +21,7 @@ from scipy import special
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1
-from scenario_gen.types import ALWAYS, canonical_presence, Vehicle
+from scenario_gen.types import Motion
 
 COURSE_NOISE_MPS = 0.3  # standard deviation of the speed across the course
 COURSE_WINDOW_S = 0.9
@@ -116,41 +115,26 @@ class Trends:
     weights: Floats
 
     @classmethod
-    def of(
-        cls,
-        position: Floats,
-        speed: Floats,
-        dt: float,
-        vehicles: Sequence[Vehicle],
-        present: Ints = ALWAYS,
-    ) -> "Trends":
-        """Return the trends of N vehicles.
+    def of(cls, encounter: Motion) -> "Trends":
+        """Return the trends of N vehicles, whose types say which speeds have no course.
 
         The standard deviation is at least that of the vehicle's type in speed, and 0.3 m/s across
-        the course.
-
-        Args:
-            position: (N, T, 2) m.
-            speed: (N, T) m/s.
-            dt: s.
-            vehicles: N; their types say what is noise, and which speeds have no course.
-            present: (N, 2) first and last sample of each vehicle; the others have weight 0.
+        the course. Samples at which a vehicle is absent have weight 0.
         """
         signals, weights = list[Floats](), list[Floats]()
-        samples = speed.shape[1]
-        present = canonical_presence(present, len(speed), samples, "trends")
-        for i, (first, last) in enumerate(present.tolist()):
-            v = speed[i, first : last + 1]
-            kind = vehicles[i].kind
+        samples, dt = encounter.speed.shape[1], encounter.dt
+        for i, vehicle in enumerate(encounter.vehicles):
+            present, kind = encounter.present_slice(i), vehicle.kind
+            v = encounter.speed[i, present]
             noise, bend = kind.speed_noise, np.diff(v, 2)
             if len(bend):
                 noise = max(noise, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0))
-            angle, pace = course(position[i, first : last + 1], v, dt, kind.least_course)
+            angle, pace = course(encounter.position[i, present], v, dt, kind.least_course)
             weight = np.where(pace > kind.least_course, pace / COURSE_NOISE_MPS, 0.0)
             edge = round(COURSE_WINDOW_S / dt) // 2
             weight[:edge] = 0.0  # half a window has three times the noise
             weight[len(weight) - edge :] = 0.0
-            padding = (first, samples - 1 - last)
+            padding = (present.start, samples - present.stop)
             signals += [np.pad(v, padding, mode="edge"), np.pad(angle, padding, mode="edge")]
             weights += [np.pad(np.full(len(v), 1.0 / noise), padding), np.pad(weight, padding)]
         stack = np.array(signals)

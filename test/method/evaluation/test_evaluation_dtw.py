@@ -68,6 +68,6 @@ def test_batched_rows_are_the_matrices(n_samples):
     rng = np.random.default_rng(3)
     a, b = (rng.normal(size=(n_samples, 2, count)) for count in (20, 30))
     single = np.stack([feature_matrix(x.T, y.T) for x, y in zip(a, b, strict=True)])
-    rows = feature_rows(a, b, feature_extents(a, b), range(3, 7))
+    rows = feature_rows(a, b, feature_extents(a, b, "euclidean"), range(3, 7), "euclidean")
     np.testing.assert_array_equal(rows.reshape(n_samples, 4, 30), single[:, 3:7])
-    np.testing.assert_allclose(mean_feature(a, b), single.mean(axis=0), atol=1e-15)
+    np.testing.assert_allclose(mean_feature(a, b, "euclidean"), single.mean(axis=0), atol=1e-15)

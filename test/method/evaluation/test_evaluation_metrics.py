@@ -163,13 +163,14 @@ def test_constant_matrix_is_left_out():
 def test_diversity_by_hand():
     position = np.zeros((3, 1, 4, 2))
     position[1, ..., 0], position[2, ..., 1] = 3.0, 4.0  # samples at (0, 0), (3, 0), (0, 4)
-    table = similarity.displacements(position)
+    counted = np.ones((1, 4), dtype=np.bool_)
+    table = similarity.displacements(position, counted)
     assert similarity.diversity(table, np.ones((1, 3)))[0] == pytest.approx(
         (3.0 + 4.0 + 5.0) / 3.0
     )
     assert similarity.diversity(table, np.array([[2.0, 1.0, 0.0]]))[0] == pytest.approx(3.0)
     assert math.isnan(similarity.diversity(np.zeros((1, 1)), ONCE)[0])
-    error = similarity.displacement_to(position, position[0])
+    error = similarity.displacement_to(position, position[0], counted)
     assert error.tolist() == [0.0, 3.0, 4.0]
     assert similarity.weighted_min(error, np.array([[0.0, 1.0, 1.0]]))[0] == 3.0
 

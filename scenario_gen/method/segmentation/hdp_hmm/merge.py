@@ -82,9 +82,8 @@ def joint_marginal(
     if i != j:
         count += sums[j, 0]
         total += sums[j, 1]
-        for a in range(len(both)):
-            for b in range(a + 1):
-                both[a, b] += outer[j, a, b]
+        for row in range(len(both)):
+            add_to(both[row], outer[j, row])
     posterior_factor(both, total, prior, factor)
     return log_marginal(factor, prior.weight * count, prior)
 
@@ -142,9 +141,7 @@ def merge_states(
         move: prior weight of every other state.
         labels: (T,) updated; `labels.max() + 1` states.
     """
-    m, states = v.shape[1], 0
-    for t in range(len(labels)):
-        states = max(states, labels[t] + 1)
+    m, states = v.shape[1], labels.max() + 1
     outer, sums, factor = np.empty((states, m, m)), np.empty((states, 2)), np.empty((m, m))
     counts = np.zeros(states, np.int64)
     n = np.empty((states + 1, states), np.int64)

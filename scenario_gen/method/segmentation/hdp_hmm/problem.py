@@ -85,11 +85,8 @@ def unexplained(
         scatter: (D, D) output, Σ mass residual residualᵀ.
         squares: (T,) output, squared length of each residual, whitened by its state's covariance.
     """
-    m, p = v.shape[1], regressors
+    m, p, states = v.shape[1], regressors, labels.max() + 1
     d = m - p
-    states = 0
-    for t in range(len(labels)):
-        states = max(states, labels[t] + 1)
     outer, sums, factor = np.empty((states, m, m)), np.empty((states, 2)), np.empty((m, m))
     coef, shape, prior = np.empty((states, d, m)), np.empty(2), Joint(g0, 1.0, 1.0, np.zeros(d))
     accumulate(v, labels, mass, outer, sums)

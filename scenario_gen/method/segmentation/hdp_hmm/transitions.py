@@ -142,11 +142,9 @@ def log_concentration(n: Ints, hyper: Floats, beta: Floats, x: float, y: float) 
     """
     total = np.exp(x)
     rho = 1.0 / (1.0 + np.exp(-y))
-    value = log_transitions(n, total, rho, beta)
-    if hyper[2] > 0.0:
-        value += hyper[2] * x - hyper[3] * total
-    if hyper[4] > 0.0:
-        value += hyper[4] * np.log(rho) + hyper[5] * np.log(1.0 - rho)
+    value: float = log_transitions(n, total, rho, beta)
+    value += hyper[2] * x - hyper[3] * total
+    value += hyper[4] * np.log(rho) + hyper[5] * np.log(1.0 - rho)
     return value
 
 
@@ -222,10 +220,8 @@ def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: F
     x = np.log(top[1])
     y = np.log(top[2] / (1.0 - top[2]))
     value = log_concentration(n, hyper, beta, x, y)
-    if hyper[2] > 0.0:
-        x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 0)
-    if hyper[4] > 0.0:
-        x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 1)
+    x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 0)
+    x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 1)
     top[1] = np.exp(x)
     top[2] = min(max(1.0 / (1.0 + np.exp(-y)), 1e-9), 1.0 - 1e-9)
 
@@ -242,7 +238,7 @@ def sample_transitions(
     Args:
         state: generator.
         n: (L + 1, L) counts.
-        hyper: see HYPER; a shape (or rho_a) <= 0 means that this concentration is fixed.
+        hyper: see HYPER.
         top: (γ, α+κ, ρ), updated.
         beta: (L,) updated.
         pi: (L + 1, L) updated.
@@ -251,15 +247,12 @@ def sample_transitions(
     tables, weights = np.empty(states), np.empty(states)
     sample_stickiness(state, n, hyper, top, beta)
     sample_tables(state, n, top, beta, tables)
-    if hyper[0] > 0.0:
-        dishes = 0
-        for k in range(states):
-            dishes += tables_draw(state, int(tables[k]), top[0] / states)
-        considered = 0.0
-        for k in range(states):
-            considered += tables[k]
-        log_eta = log_beta_draw(state, top[0], considered)[0]
-        top[0] = np.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
+    dishes, considered = 0, 0.0
+    for k in range(states):
+        dishes += tables_draw(state, int(tables[k]), top[0] / states)
+        considered += tables[k]
+    log_eta = log_beta_draw(state, top[0], considered)[0]
+    top[0] = np.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
     for k in range(states):
         weights[k] = top[0] / states + tables[k]
     dirichlet_draw(state, weights, beta)
