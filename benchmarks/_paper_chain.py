@@ -21,7 +21,7 @@ from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.fitting.fit import assemble_fit
 from scenario_gen.method.fitting.placement import place_given
 from scenario_gen.method.routing import PlanningConfig
-from scenario_gen.method.sampling import Features, Observations, Posterior, Regression
+from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.situation import find_waits, Situation, Wait

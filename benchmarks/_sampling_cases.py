@@ -17,7 +17,8 @@ from scenario_gen.method.evaluation import replay
 from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
+from scenario_gen.method.sampling import Plan, SamplingConfig
+from scenario_gen.method.sampling.stage import draw_scenarios
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats

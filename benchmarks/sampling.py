@@ -19,7 +19,8 @@ from benchmarks._sampling_cases import (
 from benchmarks._scaling_case import group
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
-from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
+from scenario_gen.method.sampling import Plan, SamplingConfig
+from scenario_gen.method.sampling.stage import draw_scenarios
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.situation import find_conflicts, Situation

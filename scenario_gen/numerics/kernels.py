@@ -247,7 +247,7 @@ def registered(*, on_demand: bool = True) -> list[Kernel]:
     return [each for each in _kernels if on_demand or not each.group]
 
 
-def import_all(packages: Sequence[str] = ()) -> None:
+def import_all(packages: Sequence[str]) -> None:
     """Import the modules with kernels of all or some packages, unless their extra is missing."""
     for file in sources():
         parts = file.relative_to(PACKAGE.parent).with_suffix("").parts

@@ -225,7 +225,7 @@ def _fitted_piece(task: VehicleTask, start: Floats, end: Floats) -> Floats | Non
     poses = np.vstack([start, piece[1:-1], end])
     if curvature.max() > task.max_curvature or edge_lengths(poses[:, :2]).min() < 1e-6:
         return None
-    free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
+    free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)
     return poses if free.all() else None
 
 
@@ -234,7 +234,7 @@ def direct_curve(
 ) -> Floats | None:
     """Return the first free one of `connecting_curves`: poses (P, 3); None if there is none."""
     for poses in connecting_curves(start, end, limit):
-        if (sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0).all():
+        if sweep_is_free(road, poses, vehicle.length, vehicle.width).all():
             return poses
     return None
 

@@ -3,7 +3,7 @@
 
 """Drivable curves: an elastic band through the anchors, then a spline of continuous curvature.
 
-The band (see `band.relax`) trades four things: closeness to a first guess, closeness to the
+The band (see `relax`) trades four things: closeness to a first guess, closeness to the
 anchors, little bending, and clearance. Where the curvature limit or the clearance is violated,
 weights rise from step to step. The cubic spline through the band has the requested headings at
 both ends; it is the spline that is verified.
@@ -104,26 +104,26 @@ class _Problem:
         return np.asarray(solveh_banded(self.matrix, self.right, lower=True, check_finite=False))
 
 
-def relax(band: Band, weights: Weights, points: Floats, steps: int) -> tuple[Floats, Weights]:
+def relax(band: Band, weights: Weights, points: Floats) -> tuple[Floats, Weights]:
     """Relax a band of M >= 6 points (M, 2) between two fixed poses.
 
     Minimises the sum over its points of hold |p - guess|^2 + pull |p - anchor|^2
     + stiffness bending (|p''|^2 + 2 |p'''|^2) + push (required or wish - clearance)^2, the last
     for each disc of the footprint that is too close to an obstacle. The headings at the ends enter
     through a mirrored point beyond each end, so that the band may bend there as anywhere.
+    ROUND_STEPS least-squares problems are solved, each linearised about the last result.
 
     Args:
         band: what attracts the band, and what it avoids.
         weights: at first.
         points: the band.
-        steps: least-squares problems to solve, each linearised about the result of the last one.
 
     Returns:
         The new points and weights.
     """
     stiffness, push = weights
     mirror = band.spacing * unit(band.yaws)
-    for _ in range(steps):
+    for _ in range(ROUND_STEPS):
         problem = _Problem(len(points))
         _add_attraction(problem, band, points)
         _add_bending(problem, band, stiffness, points, mirror)
@@ -306,7 +306,7 @@ def smooth(task: VehicleTask, weights: Floats, guess: Guess, rounds: int) -> Cur
     for k in range(1, rounds + 1):
         band = _band(task, weights, guess, points, disc)
         origin = task.road.origin
-        moved, adaptive = relax(band, adaptive, points - origin, ROUND_STEPS)
+        moved, adaptive = relax(band, adaptive, points - origin)
         is_still = np.abs(moved + origin - points).max() < STILL_M
         points = moved + origin
         if is_still or k % CHECK_ROUNDS_COUNT == 0:
@@ -398,7 +398,7 @@ def _verified(task: VehicleTask, points: Floats) -> Curve:
     step = np.maximum(edge_lengths(poses[:, :2]), 1e-6)
     curvature[1:] = np.maximum(curvature[1:], turn / step)  # sees a cusp on a straight line
     poses[0], poses[-1] = start, end
-    fits = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
+    fits = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)
     middle = np.hypot(*spline(0.5 * (u[1:] + u[:-1]), 1).T)
     pieces = np.diff(u) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson's rule
     arc = running_sum(pieces)

@@ -308,18 +308,17 @@ class Batch:
     presence: Presence
     feasible: Bools
     clock: Clock
-    lights: PlacedLights | None = None
+    lights: PlacedLights | None
 
-    def states(self, time: Floats, count: Ints | None = None) -> Floats:
+    def states(self, time: Floats, counts: Ints) -> Floats:
         """Return states (N, S, T, 5) at ascending times (T,) [s] since the scenarios' begin.
 
         A state is x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²].
 
         Args:
             time: seconds.
-            count: (S,) number of times of each candidate that are filled; None: all.
+            counts: (S,) number of times of each candidate that are filled.
         """
-        counts = np.full(len(self.feasible), len(time)) if count is None else count
         at = time + self.presence.begin[:, None]
         out = np.empty((len(self.models), *at.shape, 5))
         for n, (model, samples) in enumerate(zip(self.models, self.samples, strict=True)):

@@ -129,7 +129,8 @@ class ValidityFilter:
         lost, absent = _lost_reactions(verdict), verdict.not_applicable
         if not sampler.varies:
             return cls(check, NO_LIMIT_COUNT, enough, lost)
-        first = _scenarios([sampler.block(0, 0)]) if absent else []
+        drawn = sampler.block(0, 0).scenarios if absent else []
+        first = [each for each in drawn if each is not None]
         if first:
             verdicts = sorted(check(first), key=lambda verdict: verdict.not_applicable)
             absent = min(absent, verdicts[0].not_applicable)
@@ -219,11 +220,6 @@ def _strongest_braking(scenario: Scenario, seconds: float) -> Floats:
     first = scenario.present[:, 1:] - seconds / SAMPLE_PERIOD_S
     ending = scenario.is_present & (np.arange(len(scenario.time)) >= first)
     return np.asarray(np.where(ending, -scenario.acceleration, 0.0).max(axis=1))
-
-
-def _scenarios(blocks: Iterable[Block]) -> list[Scenario]:
-    """Return the candidates with a speed profile."""
-    return [each for block in blocks for each in block.scenarios if each is not None]
 
 
 def _lost_reactions(verdict: Verdict) -> dict[tuple[int, ...], str]:

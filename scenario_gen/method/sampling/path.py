@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from scenario_gen.method.sampling.time_warp import ClockSamples
+from scenario_gen.method.sampling.time_warp import cell_of, ClockSamples
 from scenario_gen.numerics import arc_lengths, Floats, frozen, Ints, running_sum, unit
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.loops import copy_to
@@ -246,16 +246,6 @@ def _driven(p: Floats, x: float) -> float:
 
 
 @kernel(inline=True)
-def _cell_of(arc: Floats, driven: float, j: int) -> int:
-    """Return the cell of arc lengths (G,) in which a distance lies, searched from cell j on."""
-    while j < len(arc) - 2 and driven > arc[j + 1]:
-        j += 1
-    while j > 0 and driven < arc[j]:
-        j -= 1
-    return j
-
-
-@kernel(inline=True)
 def _write_motion(p: Floats, x: float, pace: float, slope: float, out: Floats) -> None:
     """Write speed and acceleration x seconds into a piece, on a clock with this rate and slope."""
     u = p[0] + x * (p[1] + x * (p[2] + x * p[3]))
@@ -304,7 +294,7 @@ def fill_states(
             elif driven == before:
                 copy_to(out[s, k, :3], out[s, k - 1])
             else:
-                j = _cell_of(arc, driven, j)
+                j = cell_of(arc, driven, j)
                 x = _fraction(c, j, h, driven - arc[j], arc[j + 1] - arc[j])
                 _write_pose(c, j, h, x, out[s, k])
             before = driven

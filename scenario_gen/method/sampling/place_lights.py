@@ -107,17 +107,6 @@ def _known_from_start(schedule: SignalSchedule, encounter: Encounter) -> SignalS
     return replace(phases, starts=(min(first, -60.0 * (first <= encounter.dt)), *others))
 
 
-def _crossings(
-    nominal: Scenario, lights: Sequence[TrafficLight]
-) -> dict[int, tuple[TrafficLight, float]]:
-    """Return which light each vehicle faces, and when [s] it crosses the line, by its index."""
-    return {
-        n: faced
-        for n in range(len(nominal.vehicles))
-        if (faced := faced_light(nominal, n, lights)) is not None and math.isfinite(faced[1])
-    }
-
-
 def _with_offset(
     lights: tuple[TrafficLight, ...],
     nominal: Scenario,
@@ -134,7 +123,11 @@ def _with_offset(
         RefusedError: no offset does that for all vehicles.
     """
     cycles = [light for light in lights if light.schedule.repeats]
-    crossings = _crossings(nominal, cycles)
+    crossings = {  # which light each vehicle faces, and when [s] it crosses the line
+        n: faced
+        for n in range(len(nominal.vehicles))
+        if (faced := faced_light(nominal, n, cycles)) is not None and math.isfinite(faced[1])
+    }
     if not crossings:
         return PlacedLights(tuple(cycles))
     departures = _departures(cycles, nominal, graph)

@@ -138,7 +138,7 @@ class ReactionTransform:
             graph: the reactions.
             scale: factors on the standard deviations of a candidate.
         """
-        context = _Context(models, nominal, scale)
+        context = MotionContext(models, nominal, scale)
         conditions = []
         for n in graph.order:
             equations = [each for edge in graph.of(n) for each in context.equations(edge)]
@@ -190,7 +190,7 @@ def _solve(
 
 
 @dataclass(frozen=True, eq=False)
-class _Context:
+class MotionContext:
     """What the equations of a reaction depend on: models, nominal clock, and scale."""
 
     models: Sequence[VehicleModel]
@@ -204,8 +204,8 @@ class _Context:
         elif edge.gap == math.inf:
             slows = np.array([edge.since if edge.stands else edge.until])
             rows = {
-                edge.who: self._lateness(edge.who, slows),
-                edge.whom: -self._lateness(edge.whom, slows),
+                edge.who: self.lateness(edge.who, slows),
+                edge.whom: -self.lateness(edge.whom, slows),
             }
             yield _Equations(rows, _variance(edge.residual))
         else:
@@ -219,20 +219,42 @@ class _Context:
         """
         for stop in graph.stops:
             if stop.who == n and stop.stands and not stop.queue:
-                leaves = self._lateness(n, np.array([stop.until]))
+                leaves = self.lateness(n, np.array([stop.until]))
                 yield _Equations({n: leaves}, _variance(_RESIDUALS.entry))
         for who, time, slack in graph.crossings:
             if who == n:
                 sigma = min(max(_RESIDUALS.slack_share * slack, _RESIDUALS.entry), 3.0)
                 yield _Equations({n: self._arrival(n, time)}, _variance(sigma))
 
-    def _lateness(self, n: int, at: Floats) -> Floats:
-        """Return the lateness of vehicle n, see `lateness`."""
-        return lateness(self.models[n], at, self.nominal, self.scale)
+    def lateness(self, n: int, at: Floats) -> Floats:
+        """Return the seconds (q, d) by which each number of vehicle n makes it late.
 
-    def _advance(self, n: int, at: Floats) -> Floats:
-        """Return the advance of vehicle n, see `advance`."""
-        return advance(self.models[n], at, self.scale)
+        `at` (q,) are template times [s].
+        """
+        model = self.models[n]
+        rows = np.zeros((len(at), model.numbers.total))
+        if model.variation is not None:
+            grid, clock = self.nominal.grid, model.variation.clock
+            basis = np.stack([np.interp(at, grid, values) for values in clock.basis], axis=1)
+            rows[:, model.numbers.clock] = self.scale.vehicle_clock * clock.sigma * basis
+        return rows
+
+    def advance(self, n: int, at: Floats) -> Floats:
+        """Return the metres (q, d) by which each number moves vehicle n ahead, besides its clock.
+
+        `at` (q,) are template times [s].
+        """
+        model, scale = self.models[n], self.scale.longitudinal
+        rows = np.zeros((len(at), model.numbers.total))
+        driven = model.speed.spline.driven(_within(model, at))
+        rows[:, model.numbers.speed] = scale * (driven @ model.speed.factor)
+        if model.variation is not None:
+            metres = driven @ model.speed.faster
+            rows[:, model.numbers.end_speeds] = scale * metres * model.variation.end_speed
+            if model.variation.strength > 0.0:
+                metres = driven @ model.speed.strength.effect
+                rows[:, model.numbers.strength] = metres * model.variation.strength
+        return rows
 
     def _following(self, edge: Reaction) -> Iterator[_Equations]:
         """Yield the equations of lateness and advance of a follower."""
@@ -250,9 +272,9 @@ class _Context:
         slow += np.square(_RESIDUALS.rough_share) * np.eye(count)
         quick = squared_exponential(at, at, _RESIDUALS.quick_sigma, _RESIDUALS.quick_length)
 
-        seconds_rows = {who: self._lateness(who, at), whom: -self._lateness(whom, before)}
+        seconds_rows = {who: self.lateness(who, at), whom: -self.lateness(whom, before)}
         yield _Equations(seconds_rows, seconds[:, None] * seconds * slow)
-        metres_rows = {who: self._advance(who, at), whom: -self._response(edge, before)}
+        metres_rows = {who: self.advance(who, at), whom: -self._response(edge, before)}
         yield _Equations(metres_rows, metres[:, None] * metres * slow + quick)
 
     def _response(self, edge: Reaction, at: Floats) -> Floats:
@@ -261,8 +283,8 @@ class _Context:
         The share `gain` counts at once, the rest averaged over some seconds.
         """
         offsets = np.linspace(-_RESIDUALS.averaging, _RESIDUALS.averaging, 7)
-        averaged = np.mean([self._advance(edge.whom, at + offset) for offset in offsets], axis=0)
-        return np.asarray(edge.gain * self._advance(edge.whom, at) + (1.0 - edge.gain) * averaged)
+        averaged = np.mean([self.advance(edge.whom, at + offset) for offset in offsets], axis=0)
+        return np.asarray(edge.gain * self.advance(edge.whom, at) + (1.0 - edge.gain) * averaged)
 
     def _yielding(self, edge: Reaction) -> Iterator[_Equations]:
         """Yield the equations of a yielder's entry and departure."""
@@ -271,7 +293,7 @@ class _Context:
         enters = self._arrival(edge.who, edge.enters)
         yield _Equations({edge.who: enters, edge.whom: clears}, _variance(sigma))
         if edge.stands:
-            leaves = self._lateness(edge.who, np.array([edge.until]))
+            leaves = self.lateness(edge.who, np.array([edge.until]))
             covariance = _variance(edge.residual) + _variance(_RESIDUALS.event)
             yield _Equations({edge.who: leaves, edge.whom: clears}, covariance)
 
@@ -279,7 +301,7 @@ class _Context:
         """Return the seconds (1, d) by which vehicle n is late where it is at a template time."""
         at = np.array([time])
         speed = np.maximum(_mean_speed(self.models[n], at), _RESIDUALS.min_crossing_speed)
-        return self._lateness(n, at) - self._advance(n, at) / speed
+        return self.lateness(n, at) - self.advance(n, at) / speed
 
 
 def _variance(sigma: float) -> Floats:
@@ -295,40 +317,3 @@ def _within(model: VehicleModel, at: Floats) -> Floats:
 def _mean_speed(model: VehicleModel, at: Floats) -> Floats:
     """Return the speeds (q,) [m/s] without deviations at template times (q,) [s]."""
     return model.speed.spline.design(_within(model, at)) @ model.speed.mean
-
-
-def lateness(model: VehicleModel, at: Floats, nominal: Clock, scale: NoiseScale) -> Floats:
-    """Return the seconds (q, d) by which each standard normal number makes a vehicle late.
-
-    Args:
-        model: the vehicle.
-        at: (q,) template times [s].
-        nominal: the clock without deviation.
-        scale: factors on the standard deviations.
-    """
-    rows = np.zeros((len(at), model.numbers.total))
-    if model.variation is not None:
-        clock = model.variation.clock
-        basis = np.stack([np.interp(at, nominal.grid, values) for values in clock.basis], axis=1)
-        rows[:, model.numbers.clock] = scale.vehicle_clock * clock.sigma * basis
-    return rows
-
-
-def advance(model: VehicleModel, at: Floats, scale: NoiseScale) -> Floats:
-    """Return the metres (q, d) by which each number moves a vehicle ahead, besides its clock.
-
-    Args:
-        model: the vehicle.
-        at: (q,) template times [s].
-        scale: factors on the standard deviations.
-    """
-    rows = np.zeros((len(at), model.numbers.total))
-    driven = model.speed.spline.driven(_within(model, at))
-    rows[:, model.numbers.speed] = scale.longitudinal * (driven @ model.speed.factor)
-    if model.variation is not None:
-        metres = driven @ model.speed.faster
-        rows[:, model.numbers.end_speeds] = scale.longitudinal * metres * model.variation.end_speed
-        if model.variation.strength > 0.0:
-            metres = driven @ model.speed.strength.effect
-            rows[:, model.numbers.strength] = metres * model.variation.strength
-    return rows

@@ -97,7 +97,10 @@ def draw_scenarios(
         InputError: routes, segmentation and encounter disagree, or the ego does not exist.
         RefusedError: states or a target were requested, and no candidate that meets them is valid.
     """
-    slot = _ego_slot(plan, request)
+    ego, states = request.ego_of(plan.encounter), plan.requested
+    slot = None
+    if ego is not None:
+        slot = EgoSlot(plan.encounter.vehicles[ego], states.start[ego], states.end[ego])
     built = build_model(plan, config, request.order)
     if built.model is None:
         refused = Counter({Cause.SPEED_PROFILE: 1})
@@ -105,7 +108,6 @@ def draw_scenarios(
         drawn = ScenarioSet(count, (), 1, refused, (note,), slot)
     else:
         target = TargetSet.of(plan.situation, request, measures)
-        ego = request.ego_of(plan.encounter)
         sampler = Sampler(built.model, seed, plan.road.frame_id, ego)
         validity = ValidityFilter.of(sampler, check, enough_share(config, request))
         pilot, rarity = None, RarityFilter()
@@ -118,7 +120,7 @@ def draw_scenarios(
         label = label_of(plan.situation, request, target, measures, kept, validity.lost)
 
         def on_valid(scenario: Scenario) -> None:
-            callbacks.on_valid(scenario, plan.requested, slot)
+            callbacks.on_valid(scenario, states, slot)
 
         run = _Run(filters, count, callbacks, replace(sampler, label=label), on_valid)
         reached = run.draw(config.attempts * filters.rarity.valid_per_kept, pilot)
@@ -144,15 +146,6 @@ def enough_share(config: SamplingConfig, request: Request = Request()) -> float:
     if request.order == "swap":
         return 0.0
     return _ENOUGH_SHARE if config.drivers > 0.0 else _ENOUGH_OF_ONE_DRIVER_SHARE
-
-
-def _ego_slot(plan: Plan, request: Request) -> EgoSlot | None:
-    """Return the slot of the vehicle that is left out, if any."""
-    ego = request.ego_of(plan.encounter)
-    if ego is None:
-        return None
-    states = plan.requested
-    return EgoSlot(plan.encounter.vehicles[ego], states.start[ego], states.end[ego])
 
 
 @dataclass

@@ -167,6 +167,16 @@ class TimeWarp:
         return np.asarray(self._end_sigma * special.ndtri(a + (b - a) * special.ndtr(z)))
 
 
+@kernel(inline=True)
+def cell_of(grid: Floats, value: float, j: int) -> int:
+    """Return the cell of a rising grid (G,) in which a value lies, searched from cell j on."""
+    while j < len(grid) - 2 and value > grid[j + 1]:
+        j += 1
+    while j > 0 and value < grid[j]:
+        j -= 1
+    return j
+
+
 class ClockSamples(NamedTuple):
     """The clocks of S samples at up to T instants.
 
@@ -208,10 +218,7 @@ def template_times(
         j = 0
         for k in range(out.counts[s]):
             t = min(max(at[s, k], time[s, 0]), time[s, -1])
-            while j < len(grid) - 2 and t > time[s, j + 1]:
-                j += 1
-            while j > 0 and t < time[s, j]:
-                j -= 1
+            j = cell_of(time[s], t, j)
             start, end = time[s, j], time[s, j + 1]
             c1, q = h * rate[s, j], h * rate[s, j + 1]
             c2 = 3.0 * (end - start) - 2.0 * c1 - q

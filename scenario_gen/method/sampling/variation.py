@@ -157,7 +157,7 @@ class VehicleClock:
     low: Floats
     high: Floats
     bound: float
-    gaps: tuple[DriverGap, ...] = ()
+    gaps: tuple[DriverGap, ...]
 
     @classmethod
     def of(
@@ -166,8 +166,8 @@ class VehicleClock:
         rests: Sequence[tuple[float, float]],
         fixed: Sequence[bool],
         config: SamplingConfig,
-        edges: Sequence[Reaction] = (),
-        limits: Limits = Limits(),
+        edges: Sequence[Reaction],
+        limits: Limits,
     ) -> "VehicleClock":
         """Prepare the clock of a vehicle.
 

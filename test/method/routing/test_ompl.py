@@ -32,7 +32,7 @@ def test_each_planner_finds_a_sound_curve(ours, name):
     path = plans[0].path
     np.testing.assert_array_equal(path, plans[1].path)
     np.testing.assert_allclose(path[[0, -1]], [QUERY.start, QUERY.goal], atol=1e-9)
-    free = sweep_is_free(ROAD, path, QUERY.length, QUERY.width)[:, 0] > 0.0
+    free = sweep_is_free(ROAD, path, QUERY.length, QUERY.width)
     assert free.all()
     turn = np.abs(wrap_angle(np.diff(path[:, 2])))
     lengths = np.hypot(*np.diff(path[:, :2], axis=0).T)
@@ -44,17 +44,14 @@ def test_routes_use_the_chosen_planner():
     fit = straight_fit(QUERY)
     (route,) = plan_routes(ROAD, fit, PlanningConfig(planner="ompl_rrt_connect"), 1)
     assert route.searched == 1
-    free = sweep_is_free(ROAD, route.points, QUERY.length, QUERY.width)[:, 0] > 0.0
+    free = sweep_is_free(ROAD, route.points, QUERY.length, QUERY.width)
     assert free.all()
 
 
-def test_hang_crash_and_cancel_are_answers():
+def test_hang_and_crash_are_answers():
     endless = Budget(None)
     with pytest.raises(BudgetSpentError, match="did not answer within 1 s and was ended"):
         config = OmplConfig(time_limit=1.0)
         OmplPlanner("ompl_rrt_star", config).plan_poses(ROAD, QUERY, endless, 0)
     with pytest.raises(BudgetSpentError, match="without an answer"):
         OmplPlanner("no such planner").plan_poses(ROAD, QUERY, endless, 0)
-    with pytest.raises(BudgetSpentError, match="cancelled"):
-        cancelled = Budget(None, cancelled=lambda: True)
-        OmplPlanner("ompl_rrt_star").plan_poses(ROAD, QUERY, cancelled, 0)

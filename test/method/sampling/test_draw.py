@@ -13,11 +13,12 @@ from support.sampling_scenes import CLOCK, route, scene_plan, TIME, turn
 
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.road_users import Dynamics, TypeLimits
-from scenario_gen.method.sampling import Callbacks, draw_scenarios, SamplingConfig
+from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.filters import PILOT_CANDIDATES, ValidityFilter
 from scenario_gen.method.sampling.plan import _placed_abreast
 from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES, place_of
+from scenario_gen.method.sampling.stage import draw_scenarios
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
@@ -130,14 +131,19 @@ def test_same_seed_same_bytes(fifty):
     )
 
 
+def states_at(b, time):
+    """States of all candidates at all of these times."""
+    return b.states(time, np.full(len(b.feasible), len(time)))
+
+
 def test_states_agree_with_samples():
     _, some = batch(8)
     published = some.scenarios(0, range(8), "map")
     for k, s in enumerate(published):
-        state = some.states(s.time)[:, k]
+        state = states_at(some, s.time)[:, k]
         assert np.array_equal(state[..., :2], s.position)
         assert np.array_equal(state[..., 3], s.speed)
-        between = some.states(np.linspace(0.0, s.time[-1], 5001))[:, k]
+        between = states_at(some, np.linspace(0.0, s.time[-1], 5001))[:, k]
         for n in range(2):
             travelled = np.hypot(*np.diff(between[n, :, :2], axis=0).T).sum()
             assert travelled == pytest.approx(some.samples[n].paths.arc[k, -1], abs=2e-3)
@@ -179,7 +185,7 @@ def warped(b):
 def stops(b):
     """Where vehicle 1 stands [m]."""
     middle = 0.5 * (warped(b)[:, 2] + warped(b)[:, 3])
-    return np.array([b.states(middle[[k]])[1, k, 0, 1] for k in range(len(middle))])
+    return np.array([states_at(b, middle[[k]])[1, k, 0, 1] for k in range(len(middle))])
 
 
 def test_deviations_have_the_stated_standard_deviation():

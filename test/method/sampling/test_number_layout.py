@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from support.sampling_scenes import scene_plan
 
-from scenario_gen.method.sampling import relaxed_states, SamplingConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.numbers import ModelNumbers, VehicleNumbers
+from scenario_gen.method.sampling.variation import relaxed_states
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.types import FOLLOW, Reaction, ReactionGraph, Request
 

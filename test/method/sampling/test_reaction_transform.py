@@ -13,9 +13,9 @@ from support.textbook_motions import labelled
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.evaluation.measures import figures_of
-from scenario_gen.method.sampling import kept_reactions, Plan, SamplingConfig
-from scenario_gen.method.sampling.build_model import build_model
-from scenario_gen.method.sampling.reaction_transform import advance, lateness, ReactionTransform
+from scenario_gen.method.sampling import Plan, SamplingConfig
+from scenario_gen.method.sampling.build_model import build_model, kept_reactions
+from scenario_gen.method.sampling.reaction_transform import MotionContext, ReactionTransform
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
@@ -82,26 +82,24 @@ def test_transform_gives_the_stated_residual(case):
     assert np.array_equal(z[:, parts[edge.whom]], eps[:, parts[edge.whom]])
     assert np.array_equal(z[:, model.numbers.clock], eps[:, model.numbers.clock])
     assert np.allclose(z.mean(axis=0), 0.0, atol=0.06)
-    who, whom = model.vehicles[edge.who], model.vehicles[edge.whom]
+    who, whom = edge.who, edge.whom
+    context = MotionContext(model.vehicles, model.warp.nominal, NoiseScale())
     own, other = z[:, parts[edge.who]], z[:, parts[edge.whom]].copy()
-    part = whom.numbers.clock
-    other[:, part] = whom.variation.clock.effective(
+    part = model.vehicles[whom].numbers.clock
+    other[:, part] = model.vehicles[whom].variation.clock.effective(
         other[:, part], 1.0
     )  # nobody reacts to the rest
     if edge.kind == FOLLOW:
         at = np.linspace(edge.since + 4.0, edge.until - 4.0, 7)
-        late = own @ lateness(who, at, model.warp.nominal, NoiseScale()).T
-        late -= other @ lateness(whom, at - edge.lag, model.warp.nominal, NoiseScale()).T
-        ahead = (
-            own @ advance(who, at, NoiseScale()).T
-            - other @ advance(whom, at - edge.lag, NoiseScale()).T
-        )
+        late = own @ context.lateness(who, at).T
+        late -= other @ context.lateness(whom, at - edge.lag).T
+        ahead = own @ context.advance(who, at).T - other @ context.advance(whom, at - edge.lag).T
         assert late.std() < edge.residual / 8.0
         assert 0.0 < ahead.std() < 1.1 * edge.residual
     else:
-        leaves = own @ lateness(who, np.array([edge.until]), model.warp.nominal, NoiseScale()).T
-        free = other @ lateness(whom, np.array([edge.clears]), model.warp.nominal, NoiseScale()).T
-        free -= other @ advance(whom, np.array([edge.clears]), NoiseScale()).T / 8.0
+        leaves = own @ context.lateness(who, np.array([edge.until])).T
+        free = other @ context.lateness(whom, np.array([edge.clears])).T
+        free -= other @ context.advance(whom, np.array([edge.clears])).T / 8.0
         assert (leaves - free).std() == pytest.approx(0.6, abs=0.15)
         assert free.std() > 1.2
 

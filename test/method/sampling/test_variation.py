@@ -11,17 +11,24 @@ import numpy as np
 import pytest
 from support.sampling_scenes import scene_plan
 
-from scenario_gen.method.sampling import draw_scenarios, relaxed_states, SamplingConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.candidates import (
     ACCELERATION_DECAY_S,
     extrapolate,
     extrapolation_time,
 )
+from scenario_gen.method.sampling.stage import draw_scenarios
 from scenario_gen.method.sampling.time_warp import clock_from_rate
-from scenario_gen.method.sampling.variation import CAR_SIZES, truncate, Variation, VehicleClock
+from scenario_gen.method.sampling.variation import (
+    CAR_SIZES,
+    relaxed_states,
+    truncate,
+    Variation,
+    VehicleClock,
+)
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
-from scenario_gen.method.validity import Checker
+from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.types import Vehicle
 from scenario_gen.types.request import Request
 
@@ -96,7 +103,7 @@ def test_each_freedom_has_its_monotone_effect(name, measure):
 )
 def test_own_clocks_stay_within_bounds(z, start, end, shift, pace):
     config = replace(SamplingConfig(), arrival_sigma=shift, pace_sigma=pace)
-    own = VehicleClock.of(NOMINAL, [(7.0, 13.0)], (start, end), config)
+    own = VehicleClock.of(NOMINAL, [(7.0, 13.0)], (start, end), config, (), Limits())
     clock = own.sample(
         np.array([z]),
         1.0,
@@ -136,7 +143,7 @@ def test_requested_and_relaxed_states_hold():
 )
 def test_close_vehicle_hardly_becomes_longer(gap, longest):
     car, arc, none = Vehicle("1", 4.0, 1.8), np.arange(20.0), np.zeros(2)
-    clock = VehicleClock.of(NOMINAL, [], (False, False), SamplingConfig())
+    clock = VehicleClock.of(NOMINAL, [], (False, False), SamplingConfig(), (), Limits())
     made = Variation.of(car, arc, clock, np.ones((2, 2)), none, gap, SamplingConfig())
     assert made.sizes[:, 0].max() == longest
 

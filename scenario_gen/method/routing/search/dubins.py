@@ -181,15 +181,14 @@ def pose_along(pose: Pose, curve: Curve, distance: float, radius: float) -> Pose
 
 
 @kernel(POSE, POSE, F, on_demand=True)
-def shortest_curve(start: Pose, end: Pose, radius: float) -> tuple[Curve, Pose]:
-    """Return the curve of `shortest`, and the pose at its end."""
-    curve = shortest(start, end, radius)
-    return curve, pose_along(start, curve, length_of(curve), radius)
+def shortest_curve(start: Pose, end: Pose, radius: float) -> Curve:
+    """Return the curve of `shortest`."""
+    return shortest(start, end, radius)
 
 
 def dubins_poses(start: Floats, end: Floats, radius: float, spacing: float) -> Floats:
     """Return poses (P, 3) along the shortest curve between poses (3,), at most `spacing` apart."""
-    (word, *lengths), _ = shortest_curve(Pose(*start), Pose(*end), radius)
+    word, *lengths = shortest_curve(Pose(*start), Pose(*end), radius)
     return arc_poses(start, zip(TURNS[word] / radius, lengths, strict=True), spacing)
 
 

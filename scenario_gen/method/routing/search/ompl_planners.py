@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import needs
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.signals import environment_set
@@ -40,7 +41,7 @@ from scenario_gen.types import Road
 
 CHECKS_COUNT = 10  # of OMPL's termination condition, in the time of one of our own iterations
 MAX_EDGE_M = 100_000.0
-POLL_S = 0.05  # between two checks of the child and of the caller's `cancelled`
+POLL_S = 0.05  # between two checks of the child, and of whether the caller has cancelled
 
 
 @dataclass(frozen=True)
@@ -135,12 +136,11 @@ class OmplPlanner:
         """Return the child's poses, checks and CPU seconds.
 
         Raises:
-            BudgetSpentError: it died or took too long, or the caller cancelled.
+            BudgetSpentError: it died or took too long.
         """
         deadline = monotonic() + self.config.time_limit + (budget.seconds or 0.0)
         while not receiver.poll(POLL_S):
-            if budget.cancelled and budget.cancelled():
-                raise BudgetSpentError(f"{self.name} was cancelled")
+            stop_if_cancelled()
             if monotonic() > deadline:
                 raise BudgetSpentError(
                     f"{self.name} did not answer within {self.config.time_limit:.0f} s "

@@ -3,7 +3,6 @@
 
 """The interface of all geometric planners: queries, budget, answer, and the protocol."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 from typing import Protocol
@@ -30,7 +29,7 @@ class NoWayError(RefusedError):
 
 
 class BudgetSpentError(RefusedError):
-    """A route may exist, but none was found within the budget, or the search was cancelled."""
+    """A route may exist, but none was found within the budget."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,7 @@ class PoseQuery:
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of a search: `iterations`, `seconds` of CPU time, `cancelled()`.
+    """Limits of a search: `iterations`, `seconds` of CPU time.
 
     Only iterations give the same answer every time. `first` stops at the first path.
     """
@@ -83,7 +82,6 @@ class Budget:
     iterations: int | None = 2000
     seconds: float | None = None
     first: bool = False
-    cancelled: Callable[[], bool] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,9 +150,7 @@ class Search:
     def _is_over(self, budget: Budget) -> bool:
         if self.limit is not None and self.iteration >= self.limit:
             return True
-        if budget.seconds is not None and thread_time() - self.started >= budget.seconds:
-            return True
-        return budget.cancelled is not None and budget.cancelled()
+        return budget.seconds is not None and thread_time() - self.started >= budget.seconds
 
     def chains(self) -> tuple[Floats, Floats]:
         """Return the poses (k, 3) of the best path's nodes, from each root to the meeting.

@@ -26,8 +26,8 @@ from scenario_gen.method.routing.search.dubins import (
     TURNS,
 )
 from scenario_gen.method.routing.search.planner import PoseQuery
-from scenario_gen.numerics import Floats, wrap_angle
-from scenario_gen.numerics.kernels import F, F2, kernel, named, OUT1, OUT2
+from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics.kernels import F, F2, kernel, named, OUT1, OUT2, OUTB1
 from scenario_gen.numerics.polygons import is_row_open
 from scenario_gen.roads import CONTACT_CELLS, segment_free, to_cells
 from scenario_gen.types import Road
@@ -341,40 +341,33 @@ def costs_per_length(poses: Floats, scene: Scene, costs: Floats) -> None:
         costs[k] = cost_at(Pose(poses[k, 0], poses[k, 1], poses[k, 2]), scene)
 
 
-@kernel(F2, SCENE, OUT2)
-def check_sweep(poses: Floats, scene: Scene, out: Floats) -> None:
-    """Check the step to each of M near poses (M, 3) [cells, rad] from the one before.
+@kernel(F2, SCENE, OUTB1)
+def check_sweep(poses: Floats, scene: Scene, out: Bools) -> None:
+    """Write whether the step to each of M near poses (M, 3) [cells, rad] is free (M,).
 
-    Writes `out` (M, 2): 1 where the step is free (the first: the pose itself), else 0; and about
-    the room beside the footprint.
+    The first is the pose itself.
     """
     before = _frame_of(Pose(poses[0, 0], poses[0, 1], poses[0, 2]))
     for m in range(poses.shape[0]):
         frame = _frame_of(Pose(poses[m, 0], poses[m, 1], poses[m, 2]))
-        free, out[m, 1] = _sweep_step(before, frame, scene)
-        out[m, 0] = 1.0 if free else 0.0
+        out[m] = _sweep_step(before, frame, scene)[0]
         before = frame
 
 
-def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Floats:
-    """Whether a footprint can move from each of M near poses to the next, and the room beside it.
+def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Bools:
+    """Return whether a footprint can move to each of M near poses from the one before (M,).
 
     Args:
         road: the grid.
-        poses: (M, 3) x [m], y [m], yaw [rad], about 0.2 m apart or less.
+        poses: (M, 3) x [m], y [m], yaw [rad], about 0.2 m apart or less; M >= 1.
         length: of the footprint, along the yaw [m].
         width: across the yaw [m].
-
-    Returns:
-        (M, 2): 1 where the step from the pose before is free, else 0; room [m].
     """
-    poses = np.reshape(poses, (-1, 3))
-    out = np.empty((len(poses), 2))
-    if len(poses):
-        grid = np.column_stack((to_cells(road, poses[:, :2]), poses[:, 2]))
-        check_sweep(grid, car_scene(road, PoseQuery(poses[0], poses[-1], length, width, 1.0)), out)
-    out[:, 1] *= road.resolution
-    return out
+    is_free = np.empty(len(poses), dtype=np.bool_)
+    grid = np.column_stack((to_cells(road, poses[:, :2]), poses[:, 2]))
+    query = PoseQuery(poses[0], poses[-1], length, width, 1.0)
+    check_sweep(grid, car_scene(road, query), is_free)
+    return is_free
 
 
 def car_scene(road: Road, query: PoseQuery) -> Scene:
