@@ -24,7 +24,7 @@ from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Bools, edge_lengths, Floats, Ints
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import boxes_meet, fill_footprint
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import B1, F, F2, kernel, OUTB2
 from scenario_gen.types import GenerationResult, join_ego
@@ -171,7 +171,6 @@ def fill_occupied(
     pose = np.empty(5)
     box = np.empty(7)
     ego_box = np.empty(7)
-    half = world.half[world.ego]
     for pair in range(out.shape[0] * len(world.motion)):
         step = pair // len(world.motion)
         i = pair % len(world.motion)
@@ -180,9 +179,9 @@ def fill_occupied(
         if i == world.ego or ignored[i] or clock < world.spans[i, 0] or has_left:
             continue
         pose_at(world.time, world.motion[i], clock + ahead, pose)
-        fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], box)
+        fill_footprint(pose, world.half[i], box)
         for p in range(len(points)):
-            fill_box(points[p, 0], points[p, 1], points[p, 2], half[0], half[1], ego_box)
+            fill_footprint(points[p], world.half[world.ego], ego_box)
             out[step, p] = out[step, p] or boxes_meet(ego_box, box)
 
 

@@ -97,15 +97,10 @@ def ego_index(scenario: Scenario, ego: int | str) -> int:
         InputError: the scenario has no such vehicle.
     """
     ids = scenario.ids
-    if isinstance(ego, int):
-        if 0 <= ego < len(ids):
-            return ego
-        raise InputError(
-            f"scenario {scenario.index} has no vehicle number {ego} to be the ego; it has"
-            f" {len(ids)}"
-        )
+    if isinstance(ego, int) and 0 <= ego < len(ids):
+        return ego
     if ego in ids:
-        return ids.index(ego)
+        return ids.index(str(ego))
     raise InputError(
         f"scenario {scenario.index} has no vehicle {ego!r} to be the ego; it has {', '.join(ids)}"
     )
@@ -385,22 +380,16 @@ def fill_free_speeds(
 
 
 @kernel(inline=True)
-def _mark_kerbs(cells: Floats, lane: Floats, cell: float, out: Floats) -> None:
-    """Write the starts of the cells (K, 8) of a pedestrian that meet the box of a lane."""
-    for k in range(cells.shape[0]):
-        if out[k] == np.inf and boxes_meet(cells[k], lane):
-            out[k] = k * cell
-
-
-@kernel(inline=True)
 def _mark_lane(vehicle: Floats, cells: Floats, cell: float, out: Floats) -> None:
     """Write the starts of the cells (K, 8) of a pedestrian on the lane of a vehicle (K, 8)."""
-    for k in range(vehicle.shape[0]):
-        lane = vehicle[k, :7].copy()
+    for m in range(vehicle.shape[0]):
+        lane = vehicle[m, :7].copy()
         lane[4] += LANE_MARGIN_M
         lane[5] += LANE_MARGIN_M
         lane[6] += 2.0 * LANE_MARGIN_M
-        _mark_kerbs(cells, lane, cell, out)
+        for k in range(cells.shape[0]):
+            if out[k] == np.inf and boxes_meet(cells[k], lane):
+                out[k] = k * cell
 
 
 @kernel(F3, B1, F, OUT2)

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import boxes_meet, fill_footprint
 from scenario_gen.numerics.kernels import B, B1, F, F1, I1, kernel, named
 
 GAP_BISECTION_STEPS = 4  # within a cell of the clock, so that the gap does not jump
@@ -382,7 +382,7 @@ def _contact_clock(world: World, i: int, k: int, clock: float, box: Floats) -> f
     tried = (k + 1) * world.cell
     for _ in range(1 + GAP_BISECTION_STEPS):
         pose_at(world.time, world.motion[i], tried, pose)
-        fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], footprint)
+        fill_footprint(pose, world.half[i], footprint)
         if boxes_meet(footprint, box):
             high = tried
         elif high == np.inf:
@@ -459,8 +459,7 @@ def leader_acceleration(
     certified_box = np.empty(7)
     clock = driver.clock + world.step * (j == world.ego)  # the ego has already moved
     pose_at(world.time, world.motion[j], clock, leader)
-    half = world.half[j]
-    fill_box(leader[0], leader[1], leader[2], half[0], half[1], certified_box)
+    fill_footprint(leader, world.half[j], certified_box)
     certified_gap, _ = gap_ahead(world, i, driver.clock, certified_box, pose)
     if gap >= certified_gap - MODEL.min_gap_reduction_m:
         return np.inf

@@ -41,14 +41,6 @@ LEAD_BRAKING_MPS2 = 9.0  # the limit of a vehicle body
 R157_DELAY_S = 0.35  # UN Regulation 157, 5.2.5.3: least TTC = Δv / (2 · 6 m/s²) + 0.35 s
 
 
-class Runner(StrEnum):
-    """Whose motion closed the gap."""
-
-    EGO = "ego"
-    OTHER = "other"
-    BOTH = "both"
-
-
 class Reason(StrEnum):
     """The reason of a contact."""
 
@@ -216,7 +208,6 @@ class Contact:
         the reference drive is never at the place of the contact.
         """
         drive = self.drive
-        poses = self.reference
         pose = np.array(self.ego_state[:3])
         (nearest,), is_across = self._nearest_reference(pose[None])
         if is_across:
@@ -230,7 +221,7 @@ class Contact:
         other_box = _footprint(self.other_state, other)
         reach = own_box.distance(other_box) + CONTACT_MARGIN_M
         touching = own_box.intersection(other_box.buffer(reach))
-        swept = shapely.polygons(corners(poses, ego.length, ego.width))
+        swept = shapely.polygons(corners(self.reference, ego.length, ego.width))
         near = swept[shapely.intersects(swept, touching)]
         inside = touching.intersection(shapely.union_all(near))
         return bool(inside.area < 0.5 * touching.area)
@@ -269,12 +260,6 @@ class Contact:
         instant = int(able[-1]) + 1 if len(able) else 0
         return instant if instant < len(rows) else None
 
-    def _entry(self, vehicle: int, clock: float) -> int | None:
-        """Return the first instant before the contact at which a vehicle's clock is reached."""
-        entered = np.flatnonzero(self.before & (self.drive.clock[vehicle] >= clock))
-        return int(entered[0]) if len(entered) else None
-
-    @property
     def ego_has_turn(self) -> bool:
         """Whether the ego goes first at the conflict, is on its path and has not lost its turn."""
         return (
@@ -314,8 +299,9 @@ class Contact:
         """Whether the ego moves, or entered the area at a clock [s] and moved in the response."""
         if not self.ego_stands():
             return True
-        moved = (self.drive.motion.speed[self.drive.ego, self.response] >= STANDSTILL_MPS).any()
-        return bool(moved) and self._entry(self.drive.ego, clock) is not None
+        drive, ego = self.drive, self.drive.ego
+        moved = (drive.motion.speed[ego, self.response] >= STANDSTILL_MPS).any()
+        return bool(moved and (self.before & (drive.clock[ego] >= clock)).any())
 
     def is_head_on(self) -> bool:
         """Whether the ego was off its path, against the other one's direction."""
@@ -328,7 +314,7 @@ class Contact:
 
     def ego_cut_in(self) -> bool:
         """Whether the ego cut in, ahead or beside, without a safe gap, and it was not its turn."""
-        if self.cut_in is None or self.cut_in.safe or self.ego_has_turn:
+        if self.cut_in is None or self.cut_in.safe or self.ego_has_turn():
             return False
         vehicles = self.drive.motion.vehicles
         return self.cut_in.gap > -(vehicles[self.drive.ego].length + vehicles[self.other].length)
@@ -357,7 +343,7 @@ class Contact:
 
     def _other_cut_in(self) -> bool:
         """Whether the other one cut in on the ego without a safe gap in the ego's turn."""
-        if not self.ego_has_turn or self.other_stands:
+        if not self.ego_has_turn() or self.other_stands:
             return False
         entry = find_cut_in(self.loop, self.drive, (self.other, self.drive.ego), self.time)
         return entry is not None and not entry.safe
@@ -369,14 +355,6 @@ class Contact:
     def other_hit_rear(self) -> bool:
         """Whether the other one drove into the ego from behind."""
         return self.same_direction and self.distance_ahead < 0.0
-
-    def ego_has_priority(self) -> bool:
-        """Whether the ego goes first, and did."""
-        return self.ego_has_turn
-
-
-def _always(_: Contact) -> bool:
-    return True
 
 
 RULES: tuple[tuple[Reason, Callable[[Contact], bool]], ...] = (
@@ -392,15 +370,17 @@ RULES: tuple[tuple[Reason, Callable[[Contact], bool]], ...] = (
     (Reason.PRIORITY, Contact.ego_closed_gap),  # the other one had cut in
     (Reason.STANDING, Contact.ego_stands),
     (Reason.OTHER_RAN_INTO_EGO, Contact.other_hit_rear),
-    (Reason.PRIORITY, Contact.ego_has_priority),
-    (Reason.UNDECIDED, _always),
+    (Reason.PRIORITY, Contact.ego_has_turn),
 )
-"""Reasons and their conditions; the first one that holds is the reason of a contact."""
+"""Reasons and their conditions; the first one that holds is the reason of a contact.
+
+Where none holds, the contact is undecided.
+"""
 
 
 def reason_of(contact: Contact) -> Reason:
     """Return the reason of a contact."""
-    return next(reason for reason, holds in RULES if holds(contact))
+    return next((reason for reason, holds in RULES if holds(contact)), Reason.UNDECIDED)
 
 
 def _footprint(state: VehicleState, vehicle: Vehicle) -> shapely.Polygon:

@@ -19,7 +19,7 @@ from scenario_gen.closed_loop.driver import (
     way_at,
 )
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import boxes_meet, fill_box, fill_footprint
 from scenario_gen.numerics.kernels import kernel
 from scenario_gen.numerics.loops import copy_to
 
@@ -134,10 +134,9 @@ def passing_acceleration(
     if stopping_way > way:
         return -np.inf
     box = np.empty(7)
-    half = world.half[world.ego]
     last = ego.shape[0] - 1
     for m in range(last, -1, -1):
-        fill_box(ego[m, 0], ego[m, 1], ego[m, 2], half[0], half[1], box)
+        fill_footprint(ego[m], world.half[world.ego], box)
         if boxes_meet(place, box):
             wait = (m + 1) * world.step + MODEL.foot_time_s
             return approach_acceleration(parameters, i, way, speed, wait) if m < last else -np.inf
@@ -173,7 +172,7 @@ def meeting_acceleration(
         if dx * dx + dy * dy >= reach * reach:
             continue
         fill_box(pose[0], pose[1], pose[2], half[0] + clearance, half[1] + clearance, footprint)
-        fill_box(ego[m, 0], ego[m, 1], ego[m, 2], ego_half[0], ego_half[1], box)
+        fill_footprint(ego[m], ego_half, box)
         if not boxes_meet(footprint, box):
             continue
         same_direction = box[2] * footprint[2] + box[3] * footprint[3]

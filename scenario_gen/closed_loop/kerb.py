@@ -12,7 +12,7 @@ import numpy as np
 from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.closed_loop.driver import DriverParameters, DriverState, MODEL, way_at
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import boxes_meet, fill_footprint
 from scenario_gen.numerics.kernels import kernel
 
 
@@ -75,16 +75,14 @@ def _would_meet(
 ) -> bool:
     """Return whether a pedestrian that goes on would meet an ego (M, 5) that cannot stop."""
     i = walker.vehicle
-    half = world.half[i]
-    ego_half = world.half[world.ego]
     pose = np.empty(5)
     footprint = np.empty(7)
     ego_box = np.empty(7)
     for m in range(ego.shape[0] - 1):
         clock = walker.clock + (m + 1) * world.step
         pose_at(world.time, world.motion[i], clock, pose)
-        fill_box(pose[0], pose[1], pose[2], half[0], half[1], footprint)
-        fill_box(ego[m, 0], ego[m, 1], ego[m, 2], ego_half[0], ego_half[1], ego_box)
+        fill_footprint(pose, world.half[i], footprint)
+        fill_footprint(ego[m], world.half[world.ego], ego_box)
         if boxes_meet(footprint, ego_box):
             return not _ego_stops(world, parameters, walker, ego)
     return False
@@ -96,7 +94,6 @@ def _ego_stops(
 ) -> bool:
     """Return whether the ego can stop comfortably before the crossing of a pedestrian."""
     box = np.empty(7)
-    half = world.half[world.ego]
     speed = ego[0, 3]
     stopping_way = speed * MODEL.ego_response_s + speed * speed / (
         2.0 * parameters.comfortable[walker.vehicle]
@@ -107,7 +104,7 @@ def _ego_stops(
             way += np.hypot(ego[m, 0] - ego[m - 1, 0], ego[m, 1] - ego[m - 1, 1])
         if way > stopping_way:
             return True
-        fill_box(ego[m, 0], ego[m, 1], ego[m, 2], half[0], half[1], box)
+        fill_footprint(ego[m], world.half[world.ego], box)
         if _crosses(world, walker, box):
             return False
     return True

@@ -20,7 +20,7 @@ from scenario_gen.closed_loop.driver import (
     RATE,
 )
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.boxes import Box, box_gap, boxes_meet, fill_box
+from scenario_gen.numerics.boxes import boxes_meet, fill_box, fill_footprint, filled_gap
 from scenario_gen.numerics.kernels import kernel
 
 IN_WAY_M = 25.0  # a vehicle that leaves is farther away than this
@@ -117,7 +117,7 @@ def _is_in_place(
     fill_box(x, y, other[2], world.half[j, 0] + 0.5 * way, world.half[j, 1], box)
     if boxes_meet(place, box):
         return True
-    fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
+    fill_footprint(other, world.half[j], box)
     gap, _ = gap_ahead(world, i, begin, box, pose)
     excess = max(pose[3] * pose[3] - other_along * other_along, 0.0)
     response = max(pose[3] - other_along, 0.0) * parameters.delay[i] * world.step
@@ -150,29 +150,24 @@ def is_in_way(world: World, i: int, vehicles: Floats) -> bool:
     dy = vehicles[i, 1] - ego[1]
     half = world.half[i]
     ego_half = world.half[world.ego]
-    cos = np.cos(vehicles[i, 2])
-    sin = np.sin(vehicles[i, 2])
-    ego_cos = np.cos(ego[2])
-    ego_sin = np.sin(ego[2])
-    gap = box_gap(
-        Box(vehicles[i, 0], vehicles[i, 1], cos, sin, half[0], half[1]),
-        Box(ego[0], ego[1], ego_cos, ego_sin, ego_half[0], ego_half[1]),
-    )
-    if gap > max(_stopping_way(ego[3], 0.0), IN_WAY_M):
+    box = np.empty(7)
+    other = np.empty(7)
+    fill_footprint(vehicles[i], half, box)
+    fill_footprint(ego, ego_half, other)
+    cos = box[2]
+    sin = box[3]
+    ego_cos = other[2]
+    ego_sin = other[3]
+    if filled_gap(box, other) > max(_stopping_way(ego[3], 0.0), IN_WAY_M):
         return False
     same_direction = cos * ego_cos + sin * ego_sin >= MODEL.same_direction_ratio
     is_behind = dx * ego_cos + dy * ego_sin < -half[0] - ego_half[0]
     if not ((same_direction and not is_behind) or dx * cos + dy * sin > 0.0):
         return False
-    box = np.empty(7)
-    other = np.empty(7)
-    pose = vehicles[i]
-    fill_box(pose[0], pose[1], pose[2], half[0], half[1], box)
     for j in range(vehicles.shape[0]):
         if j in (i, world.ego) or vehicles[j, 4] == 0.0:
             continue
-        pose = vehicles[j]
-        fill_box(pose[0], pose[1], pose[2], world.half[j, 0], world.half[j, 1], other)
+        fill_footprint(vehicles[j], world.half[j], other)
         if boxes_meet(box, other):
             return False
     return True

@@ -86,7 +86,7 @@ class Drives:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """The drives, a row each; the values of a decision and of terms are columns."""
+        """The drives, a row each; the values of a decision are columns."""
         return pd.json_normalize(self.rows)
 
     def __repr__(self) -> str:
@@ -177,11 +177,7 @@ class Drives:
 
     def document(self) -> dict[str, Any]:
         """Return all verdicts and their summary as JSON's types."""
-        parts = {
-            "best_blind": self.blind,
-            "against": self.comparison,
-            "mutants": self.mutants,
-        }
+        parts = {"best_blind": self.blind, "against": self.comparison, "mutants": self.mutants}
         return {
             "planner": self.planner,
             **self.config.facts(),

@@ -22,7 +22,7 @@ from scenario_gen.closed_loop.driver import (
 from scenario_gen.closed_loop.presence import is_certified, is_in_way, place_at
 from scenario_gen.closed_loop.traffic_model import react
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import boxes_meet, fill_footprint
 from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB2
 from scenario_gen.numerics.loops import copy_to
 
@@ -261,12 +261,10 @@ def ego_hits(vehicles: Floats, half: Floats, present: Bools, ego: int) -> bool:
     """
     ego_box = np.empty(7)
     box = np.empty(7)
-    pose = vehicles[ego]
-    fill_box(pose[0], pose[1], pose[2], half[ego, 0], half[ego, 1], ego_box)
+    fill_footprint(vehicles[ego], half[ego], ego_box)
     for i in range(vehicles.shape[0]):
         if i != ego and present[i]:
-            pose = vehicles[i]
-            fill_box(pose[0], pose[1], pose[2], half[i, 0], half[i, 1], box)
+            fill_footprint(vehicles[i], half[i], box)
             if boxes_meet(ego_box, box):
                 return True
     return False

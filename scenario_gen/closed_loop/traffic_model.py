@@ -48,7 +48,7 @@ from scenario_gen.closed_loop.kerb import is_before_kerb, kerb_acceleration
 from scenario_gen.closed_loop.order import enforce_order, may_pass, passing_limit
 from scenario_gen.closed_loop.presence import drive_on, may_enter, place_at
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.boxes import fill_box
+from scenario_gen.numerics.boxes import fill_footprint
 from scenario_gen.numerics.kernels import kernel
 from scenario_gen.numerics.loops import copy_to
 
@@ -111,8 +111,9 @@ def react(
         if not (now.moving[i] and now.present[i]):
             _enter_or_leave(world, parameters, now, driver, seen[0], time, after[i])
             continue
-        if min(parameters.delay[i], seen.shape[0] - 1) != age:
-            age = min(parameters.delay[i], seen.shape[0] - 1)
+        delay = min(parameters.delay[i], seen.shape[0] - 1)
+        if delay != age:
+            age = delay
             predict_ego(world, seen[age], age, ego)
         bound = _bound_by_ego(world, parameters, now, driver, seen[age], ego, after)
         if drivers.shape[0] > 2:
@@ -222,8 +223,7 @@ def _bound_by_ego(
     pose = now.pose[i]
     speed = driver.rate * pose[3]
     box = np.empty(7)
-    half = world.half[world.ego]
-    fill_box(ego[0, 0], ego[0, 1], ego[0, 2], half[0], half[1], box)
+    fill_footprint(ego[0], world.half[world.ego], box)
     bound = leader_acceleration(
         world, parameters, driver, pose, world.ego, box, ego[0, 3], -seen[5]
     )
@@ -299,12 +299,11 @@ def _bound_by_leader(
 ) -> float:
     """Return the largest acceleration [m/s²] of a driver behind vehicle j, which is no ego."""
     box = np.empty(7)
-    pose = now.pose[j]
-    fill_box(pose[0], pose[1], pose[2], world.half[j, 0], world.half[j, 1], box)
-    speed = now.drivers[j, RATE] * pose[3]
+    fill_footprint(now.pose[j], world.half[j], box)
+    speed = now.drivers[j, RATE] * now.pose[j, 3]
     braking = -now.drivers[j, ACCELERATION]
-    own_pose = now.pose[driver.vehicle]
-    return leader_acceleration(world, parameters, driver, own_pose, j, box, speed, braking)
+    pose = now.pose[driver.vehicle]
+    return leader_acceleration(world, parameters, driver, pose, j, box, speed, braking)
 
 
 @kernel(inline=True)

@@ -49,7 +49,6 @@ from scenario_gen.types import (
     Interval,
     join_ego,
     Road,
-    Scenario,
 )
 
 MakePlanner = Callable[[], Planner]
@@ -129,33 +128,8 @@ def _trials_in(namespace: Namespace, ego: str) -> Iterator[Trial]:
         name = f"{namespace.name} {scenario.index}".strip()
         place = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
         road = namespace.road_of(entry, stamp)
-        trial = trial_of(name, scenario, entry, road, ego, place)
-        yield replace(trial, encounter=_encounter_of(entry))
-
-
-def trial_of(
-    name: str,
-    scenario: Scenario,
-    entry: ScenarioEntry | None,
-    road: Road | None,
-    ego: str,
-    place: str,
-) -> Trial:
-    """Return the trial of a scenario, with its reference drive among the vehicles if it has one.
-
-    Args:
-        name: display name.
-        scenario: the scenario, from a recording or from a message.
-        entry: its entry on `scenarios/info`, if known.
-        road: its road, if known.
-        ego: id of the vehicle that the ego replaces; "": that of the ego slot, or the first.
-        place: place of the scenario, for messages.
-
-    Raises:
-        InputError: there is no such vehicle, the scenario was made for another ego, or the
-            reference drive is missing.
-    """
-    return Trial(name, join_ego(scenario), ego_of(scenario, entry, ego, place), road)
+        who = ego_of(scenario, entry, ego, place)
+        yield Trial(name, join_ego(scenario), who, road, _encounter_of(entry))
 
 
 def trials_of(result: GenerationResult, ego: str | int = "") -> list[Trial]:
@@ -172,8 +146,9 @@ def trials_of(result: GenerationResult, ego: str | int = "") -> list[Trial]:
     ego, trials = str(ego), []
     for scenario in result:
         index = str(scenario.index)
-        trial = trial_of(index, scenario, None, result.road, ego, f"scenario {index}")
-        trials.append(replace(trial, encounter=result.encounter.recording))
+        who = ego_of(scenario, None, ego, f"scenario {index}")
+        recording = result.encounter.recording
+        trials.append(Trial(index, join_ego(scenario), who, result.road, recording))
     return trials
 
 
@@ -346,13 +321,13 @@ def _drive(name: str, loop: ClosedLoop, make: MakePlanner) -> Outcome:
         if os.getpid() != process:  # the planner has forked: only the parent has a result
             os._exit(1)
     decisions = Decisions() if timed is None else timed.decisions
-    if error is None:
-        return Outcome(name, verdict, drive, decisions=decisions)
-    if len(states) == 1:
-        states.append(loop.step(states[0], None))
-    drive = loop.record(states)
-    verdict = replace(judge(loop, drive, ()), error=_where(error, config))
-    text = "".join(traceback.format_exception(error))
+    text = ""
+    if error is not None:
+        if len(states) == 1:
+            states.append(loop.step(states[0], None))
+        drive = loop.record(states)
+        verdict = replace(judge(loop, drive, ()), error=_where(error, config))
+        text = "".join(traceback.format_exception(error))
     return Outcome(name, verdict, drive, decisions=decisions, traceback=text)
 
 

@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
 import math
 from typing import Any
 
@@ -13,14 +14,7 @@ import numpy as np
 from scenario_gen.closed_loop.contacts import contact_times
 from scenario_gen.closed_loop.criteria import CheckedCriterion, CriterionResult
 from scenario_gen.closed_loop.drive import Drive
-from scenario_gen.closed_loop.fault import (
-    Contact,
-    CutIn,
-    Reason,
-    reason_of,
-    Runner,
-    STANDSTILL_MPS,
-)
+from scenario_gen.closed_loop.fault import Contact, CutIn, Reason, reason_of, STANDSTILL_MPS
 from scenario_gen.closed_loop.imposed import imposed_braking
 from scenario_gen.closed_loop.lights import ran_red
 from scenario_gen.closed_loop.off_road import (
@@ -34,11 +28,17 @@ from scenario_gen.method.evaluation import distance_and_ttc
 from scenario_gen.numerics import Floats, unit
 from scenario_gen.situation import conflict_of, encroachment
 
-__all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
-
 JERK_WINDOW_S = 0.5
 MAX_TTC_S = 8.0
 MIN_STANDSTILL_S = 5.0  # an ego that stood so long at the end missed its goal for that reason
+
+
+class Runner(StrEnum):
+    """Whose motion closed the gap."""
+
+    EGO = "ego"
+    OTHER = "other"
+    BOTH = "both"
 
 
 @dataclass(frozen=True)
@@ -254,13 +254,7 @@ class DriveVerdict:
 
     def document(self) -> dict[str, Any]:
         """Return the verdict as JSON's types, with null for NaN."""
-        plain = asdict(self) | {
-            "passed": self.passed,
-            "at_fault": self.at_fault,
-            "fault": self.fault,
-        }
-        plain["sentence"] = self.sentence()
-        plain["criteria"] = [
+        criteria = [
             {
                 "name": result.name,
                 "value": result.value if math.isfinite(result.value) else None,
@@ -269,6 +263,13 @@ class DriveVerdict:
             }
             for result in self.criteria
         ]
+        plain = asdict(self) | {
+            "passed": self.passed,
+            "at_fault": self.at_fault,
+            "fault": self.fault,
+            "sentence": self.sentence(),
+            "criteria": criteria,
+        }
         return {
             key: None if isinstance(value, float) and math.isnan(value) else value
             for key, value in plain.items()
@@ -309,14 +310,14 @@ def judge(
         seed=motion.seed,
         ego=motion.vehicles[drive.ego].id,
         duration=float(motion.time[-1]),
-        collision=None if hit is None else _collision(loop, drive, hit),
+        collision=None if hit is None else _collision(loop, drive, *hit),
         off_road=off_road,
         obstacle=obstacle,
         goal=goal,
         delay=goal - loop.duration,
         min_ttc=min_ttc,
         min_gap=min_gap,
-        min_pet=_pet(drive) if hit is None else float(np.fmin(_pet(drive), 0.0)),
+        min_pet=_pet(drive, math.nan if hit is None else 0.0),
         hardest_braking=float(braking.max()),
         hard_braking=round(hard_braking_count * config.step, 9),
         jerk=_jerk(drive.accelerations, config.step),
@@ -338,16 +339,13 @@ def judge(
 
 def _first_of_ego(
     drive: Drive, contacts: dict[tuple[int, int], float]
-) -> tuple[int, float] | None:
-    """Return the first vehicle that the ego touches, and the time [s]; None if there is none."""
+) -> tuple[float, int] | None:
+    """Return the time [s] at which the ego first touches a vehicle, and which; None if never."""
     hits = [(time, sum(pair) - drive.ego) for pair, time in contacts.items() if drive.ego in pair]
-    if not hits:
-        return None
-    time, other = min(hits)
-    return other, time
+    return min(hits, default=None)
 
 
-def _clearance(drive: Drive, hit: tuple[int, float] | None) -> tuple[float, float]:
+def _clearance(drive: Drive, hit: tuple[float, int] | None) -> tuple[float, float]:
     """Return the least distance [m] and TTC [s] of the ego and the others.
 
     Without others the distance is NaN. The TTC is at most MAX_TTC_S.
@@ -359,8 +357,8 @@ def _clearance(drive: Drive, hit: tuple[int, float] | None) -> tuple[float, floa
         distance, to_contact = distance_and_ttc(drive.motion, drive.ego, i)
         distance = np.where(drive.present[i], distance, np.inf)
         to_contact = np.where(drive.present[i], to_contact, np.inf)
-        if hit is not None and hit[0] == i:  # between two instants, or after the last one
-            k = int(np.searchsorted(drive.motion.time[:-1], hit[1]))
+        if hit is not None and hit[1] == i:  # between two instants, or after the last one
+            k = int(np.searchsorted(drive.motion.time[:-1], hit[0]))
             distance[k] = to_contact[k] = 0.0
         gap = float(np.fmin(gap, distance.min()))
         ttc = min(ttc, float(to_contact.min()))
@@ -381,12 +379,11 @@ def _stood(speed: Floats, step: float) -> float:
     return round((len(speed) - 1 - (int(moved[-1]) if len(moved) else 0)) * step, 9)
 
 
-def _collision(loop: ClosedLoop, drive: Drive, hit: tuple[int, float]) -> Collision:
-    """Return the facts of a contact with a vehicle at a time [s].
+def _collision(loop: ClosedLoop, drive: Drive, time: float, other_index: int) -> Collision:
+    """Return the facts of a contact at a time [s] with a vehicle.
 
     The speeds along the line of the centres decide which vehicle closed the gap.
     """
-    other_index, time = hit
     contact = Contact(loop, drive, other_index, time)
     ego, other = contact.ego_state, contact.other_state
     velocity, other_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
@@ -416,8 +413,10 @@ def _goal_time(loop: ClosedLoop, drive: Drive) -> float:
     return float(motion.time[np.argmax(reached)]) if reached.any() else math.nan
 
 
-def _pet(drive: Drive) -> float:
-    """Return the ego's least post-encroachment time [s]; NaN if nobody crosses or merges.
+def _pet(drive: Drive, most: float) -> float:
+    """Return the ego's least post-encroachment time [s], at most `most`.
+
+    It is `most` if nobody crosses or merges; NaN is no limit.
 
     Source: Allen, Shin & Cooper 1978.
     """
@@ -431,7 +430,7 @@ def _pet(drive: Drive) -> float:
         conflict = conflict_of(pair, 0, 1)
         if conflict is not None:
             times.append(encroachment(pair, conflict))
-    return float(np.fmin.reduce(times, initial=math.nan))
+    return float(np.fmin.reduce(times, initial=most))
 
 
 def _jerk(acceleration: Floats, step: float) -> float:

@@ -147,6 +147,20 @@ def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: F
 
 
 @kernel(inline=True)
+def fill_footprint(pose: Floats, half: Floats, out: Floats) -> None:
+    """Write the box (7,) of half sizes (2,) [m] at a pose: x, y [m], yaw [rad] and more."""
+    fill_box(pose[0], pose[1], pose[2], half[0], half[1], out)
+
+
+@kernel(inline=True)
+def filled_gap(a: Floats, b: Floats) -> float:
+    """Return the signed gap [m] of two boxes (7,) from `fill_box`, as `box_gap` does."""
+    box_a = Box(a[0], a[1], a[2], a[3], a[4], a[5])
+    box_b = Box(b[0], b[1], b[2], b[3], b[4], b[5])
+    return box_gap(box_a, box_b)
+
+
+@kernel(inline=True)
 def boxes_meet(a: Floats, b: Floats) -> bool:
     """Return whether two boxes from `fill_box` overlap."""
     dx = b[0] - a[0]
@@ -154,9 +168,7 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
     reach = a[6] + b[6]
     if dx * dx + dy * dy >= reach * reach:
         return False
-    box_a = Box(a[0], a[1], a[2], a[3], a[4], a[5])
-    box_b = Box(b[0], b[1], b[2], b[3], b[4], b[5])
-    return box_gap(box_a, box_b) < 0.0
+    return filled_gap(a, b) < 0.0
 
 
 def footprint_gaps(

@@ -7,7 +7,7 @@ Parameters, commands to the ego, live trials, states of a drive.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import json
 from time import time_ns
 
@@ -30,6 +30,7 @@ from msg_conventions.poses import decode_odometry, encode_frames, encode_odometr
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import Info, ScenarioEntry
 from msg_conventions.topics import vehicle_topic
+from scenario_gen.bags.recordings.read import ego_of
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
@@ -39,9 +40,9 @@ from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.tracking import of_twist, Track
-from scenario_gen.closed_loop.trials import Outcome, trial_of
+from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Road
+from scenario_gen.types import join_ego, Road
 
 INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
 TIMED_INPUTS = ("ego/trajectory", "ego/path")  # their points have times, so they may be old
@@ -255,8 +256,8 @@ class ArrivingTrials:
         entry, _, scenario = decoded
         name = f"{entry.request} {entry.index}"
         road = self._roads.get(entry.map_hash or "")
-        trial = trial_of(name, scenario, entry, road, ego, f"scenario {name}")
-        return replace(trial, request=entry.request)
+        who = ego_of(scenario, entry, ego, f"scenario {name}")
+        return Trial(name, join_ego(scenario), who, road, request=entry.request)
 
     def _accepts(self, info: Info) -> bool:
         """Return whether an entry or a summary concerns the scenarios to be driven."""

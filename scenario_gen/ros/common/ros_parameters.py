@@ -133,8 +133,8 @@ class ConfigParameters:
         # ROS ignores a parameter file for another node silently; the log shows it.
         values = values_of(self.config)
         node.get_logger().debug(f"all parameters: {_listed(values)}")
-        defaults = flatten(config)
-        given = {name: value for name, value in values.items() if value != defaults[name][1]}
+        defaults = values_of(config)
+        given = {name: value for name, value in values.items() if value != defaults[name]}
         node.get_logger().info(f"parameters: {_listed(given) or 'all have their defaults'}")
 
     def _prepare(self, parameters: list[Parameter]) -> list[Parameter]:
