@@ -209,15 +209,24 @@ def _feasible_stretch(
         if len(feasible) < len(means):
             failed = means
             continue
-        pairs = zip(routed, feasible, strict=True)
-        shift = max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
+        shift = _largest_shift(routed, feasible)
         if shift < least_shift - _TUNING.free_shift:
-            percent = 100.0 * (stretch - 1.0)
-            notes = [Note.of(NoteKind.STRETCHED, percent=percent)] if percent > 0.0 else []
-            best, least_shift = _Stretch(stretched, feasible, notes, ""), shift
+            best, least_shift = _Stretch(stretched, feasible, _stretch_notes(stretch), ""), shift
         if shift <= _TUNING.free_shift:
             break
     return best if best.means else best._replace(refusal=_refusal(routed, failed, clock))
+
+
+def _largest_shift(routed: Sequence[RoutedVehicle], means: Sequence[MeanSpeed]) -> float:
+    """Return the largest distance [m] of any vehicle from a changepoint when it is due."""
+    pairs = zip(routed, means, strict=True)
+    return max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
+
+
+def _stretch_notes(stretch: float) -> list[Note]:
+    """Return the note on a stretched clock, if it is stretched."""
+    percent = 100.0 * (stretch - 1.0)
+    return [Note.of(NoteKind.STRETCHED, percent=percent)] if percent > 0.0 else []
 
 
 def _refusal(

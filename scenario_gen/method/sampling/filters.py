@@ -129,8 +129,7 @@ class ValidityFilter:
         lost, absent = _lost_reactions(verdict), verdict.not_applicable
         if not sampler.varies:
             return cls(check, NO_LIMIT_COUNT, enough, lost)
-        drawn = sampler.block(0, 0).scenarios if absent else []
-        first = [each for each in drawn if each is not None]
+        first = _drivable(sampler.block(0, 0)) if absent else []
         if first:
             verdicts = sorted(check(first), key=lambda verdict: verdict.not_applicable)
             absent = min(absent, verdicts[0].not_applicable)
@@ -220,6 +219,11 @@ def _strongest_braking(scenario: Scenario, seconds: float) -> Floats:
     first = scenario.present[:, 1:] - seconds / SAMPLE_PERIOD_S
     ending = scenario.is_present & (np.arange(len(scenario.time)) >= first)
     return np.asarray(np.where(ending, -scenario.acceleration, 0.0).max(axis=1))
+
+
+def _drivable(block: Block) -> list[Scenario]:
+    """Return the candidates with a speed profile."""
+    return [each for each in block.scenarios if each is not None]
 
 
 def _lost_reactions(verdict: Verdict) -> dict[tuple[int, ...], str]:

@@ -340,9 +340,7 @@ def sample(
     start = find_start(problem, config, np.random.Generator(np.random.PCG64(first)))
     streams = [np.random.Generator(np.random.PCG64(stream)) for stream in seeds]
     states = config.states or start.states + SPARE_COUNT
-    places = [start.place]
-    places += [other_start(start, config, k, streams[k]) for k in range(1, config.chains)]
-    places = [Place(np.minimum(place.labels, states - 1), place.mass) for place in places]
+    places = _places(start, config, states, streams)
     while True:
         pairs = zip(places, streams, strict=True)
         chains = [Chain(start, config, place, states, rng) for place, rng in pairs]
@@ -366,6 +364,15 @@ def sample(
         extra=extra,
         worth=worth,
     )
+
+
+def _places(
+    start: Start, config: SamplerConfig, states: int, streams: list[np.random.Generator]
+) -> list[Place]:
+    """Return where each chain starts, with labels below `states`."""
+    places = [start.place]
+    places += [other_start(start, config, k, streams[k]) for k in range(1, config.chains)]
+    return [Place(np.minimum(place.labels, states - 1), place.mass) for place in places]
 
 
 def run_until_agreed(chains: Sequence["Chain"], config: SamplerConfig) -> None:
