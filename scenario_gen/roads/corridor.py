@@ -52,7 +52,10 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
             paths[name_of_vehicle] = path
     lanes: list[Lane] = []
     for lane_name, sharing in sharing_lanes(paths).items():
-        line = paths[lane_name].cut(0.0, paths[lane_name].length, 1.0)
+        whole = paths[lane_name]
+        ends = np.concatenate([paths[each].points[[0, -1], :2] for each in sharing])
+        reached, _ = whole.project(ends)
+        line = whole.cut(float(reached.min()), float(reached.max()), 1.0)
         vehicles = [tracks[each].vehicle for each in sharing]
         half = _half_widths(line, vehicles, config.corridor_margin)
         lanes.append(lane_along(f"along vehicle {lane_name}", line, half))

@@ -13,6 +13,7 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.situation import Situation
 from scenario_gen.situation.separation import smallest_gaps
+from scenario_gen.types import Encounter, Vehicle
 
 ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
 
@@ -75,3 +76,22 @@ def test_recorded_encounters_fit_their_corridors(path):
     for track in separation.tracks:
         size = track.vehicle.length, track.vehicle.width + 1.0
         assert footprint_fits(road, track.poses, *size).all(), track.vehicle.id
+
+
+def test_corridor_lane_holds_who_shares_it():
+    """The last of three has the longest path; the lane goes on to where the first one ends."""
+    time = np.arange(0.0, 10.05, 0.1)
+    starts, speeds = np.array([0.0, -20.0, -45.0]), np.array([7.0, 7.2, 7.5])
+    x = starts[:, None] + speeds[:, None] * time
+    encounter = Encounter.sampled(
+        tuple(Vehicle(name) for name in "abc"),
+        0.1,
+        np.stack([x, np.zeros_like(x)], axis=-1),
+        np.zeros_like(x),
+        np.broadcast_to(speeds[:, None], x.shape),
+        "platoon",
+    )
+    (lane,) = build_road("corridor", encounter).lanes.lanes
+    half = 0.5 * encounter.vehicles[0].length
+    assert lane.centre[:, 0].min() < x.min() - half
+    assert lane.centre[:, 0].max() > x.max() + half

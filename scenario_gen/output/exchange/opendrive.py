@@ -30,7 +30,7 @@ _SIGNALS = {**SIGN_IDS, RuleKind.TRAFFIC_LIGHT: "1000001"}
 """Types of signals; that of a light is OpenDRIVE's."""
 STRAIGHT_TOLERANCE_RAD = 1e-7  # heading change of a straight piece
 STOP_LINE_M = 0.5  # thickness
-LINEAR_TOLERANCE_M = 1e-5  # deviation of a width or an offset from its linear piece
+LINEAR_TOLERANCE_M = 1e-4  # deviation of a width or an offset from its linear piece
 _LANE_TYPES = {  # with the drivers that may use them
     "sidewalk": frozenset[str](),
     "biking": frozenset(("bicycle",)),
