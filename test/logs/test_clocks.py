@@ -18,6 +18,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.extract import encounter_quality
 from scenario_gen.logs.growing import Growth
 from scenario_gen.logs.stamps import time_of_day
+from scenario_gen.logs.table_parts import apart_by_scene
 from scenario_gen.types import Encounter, Vehicle
 
 S_TO_NS = 10**9
@@ -67,6 +68,19 @@ def test_parts_follow_in_turn(seed, gap):
     gaps = (moved[1:, 0] - moved[:-1, 1]) / S_TO_NS
     assert shifts[0] == 0 and not (shifts % S_TO_NS).any()
     assert (gaps >= gap).all() and ((gaps < gap + 1.0) | (shifts[1:] == shifts[:-1])).all()
+
+
+@pytest.mark.parametrize(("shared_count", "is_apart"), [(19, False), (20, True)])
+def test_scenes_of_single_vehicles_are_trips(shared_count, is_apart):
+    """Of 40 scenes at one time, half or more have two vehicles."""
+    rows = [
+        (time, scene, vehicle)
+        for scene in range(40)
+        for vehicle in range(1 + (scene < shared_count))
+        for time in (0, S_TO_NS)
+    ]
+    table, notes = apart_by_scene(pd.DataFrame(rows, columns=["time", "scene", "vehicle"]))
+    assert bool(notes) == is_apart and (table["time"].nunique() == 80) == is_apart
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,15 @@ def fed(messages, config=LogConfig()):
     return streams
 
 
+def test_messages_have_stamp_row_and_value():
+    streams = Streams()
+    streams.put_fix("1", 7 * TICK, 48.0, 11.0)
+    streams.put_speed("1", 8 * TICK, 3.5)
+    (vehicle,) = streams.flush("live").vehicles
+    assert (vehicle.fix_ns, vehicle.fix_row, vehicle.fix.tolist()) == (7 * TICK, 1, [[48.0, 11.0]])
+    assert (vehicle.speed_ns, vehicle.speed_row, vehicle.speed) == (8 * TICK, 2, 3.5)
+
+
 def test_streams_are_read_like_a_log(encounter):
     streams = fed(messages_of(encounter))
     (again,) = encounters_of(streams.flush("live"), streams.config).encounters
