@@ -28,7 +28,7 @@ with trial_runner("scenario_gen.closed_loop.planners:ConstantSpeed", ClosedLoopC
     "compilers of kernels": """
 import os
 os.environ["NUMBA_CACHE_DIR"] = os.getcwd() + "/kernels"
-from scenario_gen.logs import gap
+from scenario_gen.numerics import boxes
 from scenario_gen.numerics.compiling import make_ready
 from scenario_gen.numerics.kernels import registered
 smallest = min(registered(), key=lambda kernel: kernel.size)

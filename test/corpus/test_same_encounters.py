@@ -69,9 +69,8 @@ def both(folder, out):
     )
 
 
-@pytest.mark.parametrize(("behind", "speed"), [(2.0, 33.0), (1.2, 38.0)])
-def test_a_column_of_13(tmp_path, behind, speed):
-    mined, read = both(column(tmp_path / "in", 13, behind, speed), tmp_path / "out")
+def test_a_column_of_13(tmp_path):
+    mined, read = both(column(tmp_path / "in", 13, 1.2, 38.0), tmp_path / "out")
     assert read == mined
     assert {name for names, _, _ in read for name in names} == set(range(1, 14))
 

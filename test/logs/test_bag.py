@@ -14,6 +14,7 @@ from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from support.log_builders import crossing, geographic, save
 from support.recording_files import tracked
 
+from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.definitions import definition, type_store
@@ -73,31 +74,14 @@ def streams(rows, stamped=True, prefix=""):
 
 def odometry(rows, topic="/{}/odom", frame="map", child="base_link", late=0.0):
     """nav_msgs/Odometry per vehicle, received `late` seconds after its stamp."""
-    types = STORES.types
     lines = []
     for row in rows.itertuples():
-        yaw = getattr(row, "yaw", 0.0 if row.vehicle_id == "a" else np.pi / 2.0)
-        turn = types["geometry_msgs/msg/Quaternion"](
-            x=0.0, y=0.0, z=np.sin(yaw / 2.0), w=np.cos(yaw / 2.0)
-        )
-        pose = types["geometry_msgs/msg/Pose"](
-            types["geometry_msgs/msg/Point"](row.x_m, row.y_m, 0.0), turn
-        )
-        twist = twist_of(row.speed_mps)
-        message = types[ODOMETRY](
-            header=header(round(row.t_s * 1e9), frame.format(row.vehicle_id)),
-            child_frame_id=child.format(row.vehicle_id),
-            pose=types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
-            twist=types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
-        )
-        lines.append(
-            Line(
-                topic.format(row.vehicle_id),
-                ODOMETRY,
-                round((row.t_s + late) * 1e9),
-                bytes(STORES.serialize_cdr(message, ODOMETRY)),
-            )
-        )
+        name = row.vehicle_id
+        yaw = getattr(row, "yaw", 0.0 if name == "a" else np.pi / 2.0)
+        state = np.array([row.x_m, row.y_m, yaw, row.speed_mps])
+        stamp = round(row.t_s * 1e9)
+        data = encode_state(state, child.format(name), frame.format(name), stamp)
+        lines.append(Line(topic.format(name), ODOMETRY, stamp + round(late * 1e9), data))
     return lines
 
 

@@ -25,11 +25,6 @@ def held(rows):
     return rows.assign(x_m=position["x_m"], y_m=position["y_m"])
 
 
-def sparse(rows):
-    """Own slow tracks: a fix every 5 s, and the speeds do not help."""
-    return rows[rows.groupby("vehicle_id").cumcount() % 50 == 0].drop(columns="speed_mps")
-
-
 def with_kind(rows):
     dog = rows[rows.vehicle_id == "a"].assign(vehicle_id="w", y_m=5.0)
     names = {"a": "Car", "b": "vehicle.car", "w": "animal.dog.0007"}

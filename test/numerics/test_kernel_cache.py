@@ -15,7 +15,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import own_folder
 
 PROGRAM = """
-from scenario_gen.logs import gap
+from scenario_gen.numerics import boxes
 from scenario_gen.numerics.compiling import words
 from scenario_gen.numerics.kernels import registered
 kernel = min(registered(), key=lambda each: each.size)
@@ -55,9 +55,13 @@ def test_kernel_cache_is_shared_and_repaired(tmp_path):
         shutil.copytree(ROOT / name, copy / name, copy_function=shutil.copyfile)
     assert compiled(copy, cache)[0] == 1
     for damaged in DAMAGES:
+        spoiled = {}
         for file in (*cache.rglob("*.nbi"), *cache.rglob("*.nbc")):
-            file.write_bytes(damaged(file.read_bytes()))
-        assert [compiled(ROOT, cache)[0] for _ in range(2)] == [0, 1]
+            spoiled[file] = damaged(file.read_bytes())
+            file.write_bytes(spoiled[file])
+        assert compiled(ROOT, cache)[0] == 0
+        assert not any(file.read_bytes() == data for file, data in spoiled.items())
+    assert compiled(ROOT, cache)[0] == 1
     cache.chmod(0o777)
     hits, text = compiled(ROOT, cache)
     assert hits == 0
