@@ -353,6 +353,16 @@ def test_speeds_contradict_positions_from_a_fifth(tmp_path, factor, stops, sign)
     assert [doubt.stops for doubt in doubts if "times those" in doubt.cause] == stops
 
 
+@pytest.mark.parametrize(("factor", "is_doubted"), [(7.5, False), (8.0, True)])
+def test_no_road_vehicle_exceeds_70_mps(tmp_path, factor, is_doubted):
+    """The typical speed is 9 m/s."""
+    rows = ROWS[["t", "id", "x", "y"]].assign(x=factor * ROWS.x, y=factor * ROWS.y)
+    rows.to_csv(tmp_path / "log.csv", index=False)
+    config = LogConfig(allow="doubt", proximity=1000.0)
+    doubts = read_log(tmp_path / "log.csv", config).doubts
+    assert any("are they pixels" in doubt.cause for doubt in doubts) == is_doubted
+
+
 EGO_HEADINGS = {
     "relative": lambda rows: rows.h - rows.ego_yaw,
     "on the ground": lambda rows: rows.h,
