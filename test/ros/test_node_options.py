@@ -53,11 +53,17 @@ def test_rule_for_one_node_spares_others(start, client):
     )
 
 
-def test_simulated_time_stamps_diagnostics(start, client):
-    client.hear("/diagnostics")
-    start("road_server", use_sim_time=True, road_name="straight")
+def test_simulated_time_and_overridden_qos(start, client):
+    """One node has both: the time of /clock in its diagnostics, and the quality that one topic was given."""
+    from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
     from rosgraph_msgs.msg import Clock
 
+    client.hear("/diagnostics")
+    overrides = {
+        "qos_overrides./map.publisher.reliability": "best_effort",
+        "qos_overrides./map.publisher.durability": "volatile",
+    }
+    start("road_server", use_sim_time=True, road_name="straight", **overrides)
     clock, now = client.node.create_publisher(Clock, "/clock", 10), Clock()
     now.clock.sec = 7
 
@@ -67,16 +73,6 @@ def test_simulated_time_stamps_diagnostics(start, client):
         return any(stamp_of(data, "diagnostics") == 7_000_000_000 for data in heard)
 
     client.until(stamped, "a status at the time of /clock")
-
-
-def test_qos_of_one_topic_is_overridden(start, client):
-    from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-
-    overrides = {
-        "qos_overrides./map.publisher.reliability": "best_effort",
-        "qos_overrides./map.publisher.durability": "volatile",
-    }
-    start("road_server", road_name="straight", **overrides)
     for topic in ("/map", "/road/lanes"):
         client.until(lambda topic=topic: client.node.count_publishers(topic), topic)
     offered = {

@@ -10,13 +10,16 @@ import time
 
 from mcap.reader import make_reader
 import pytest
+from support.bag_examples import hand_made_run
 from support.suite_processes import Client, RESOURCES
 
+from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 
 pytestmark = pytest.mark.dds
 
 QUEUE = 1000
+TOPICS = ("scenarios", "scenarios/info")
 
 
 def publisher(client: Client, kind: type, topic: str):
@@ -233,3 +236,41 @@ def test_recording_waits_for_simulated_time(start, client, tmp_path):
     client.until(lambda: client.counted("/chat") == 1, "the message in the bag")
     ended(recorder)
     assert [message.stamp_ns for message in read_messages(bag)] == [1_000_000_000_000]
+
+
+@pytest.fixture
+def others(domain):
+    """Two nodes that also publish the topics of scenarios."""
+    made = [Client(domain, name) for name in ("one", "two")]
+    for other in made:
+        for topic in TOPICS:
+            other.announce(topic)
+    yield made
+    for other in made:
+        other.close()
+
+
+@pytest.mark.usefixtures("others")
+def test_recorder_blames_two_publishers(start, client, tmp_path):
+    """Messages of one request, of which a second node of the same topics makes others."""
+    start("recorder", bag=tmp_path / "bag")
+    client.hear("/diagnostics")
+    client.until(lambda: client.node.count_publishers("/scenarios/info") == 2, "both others")
+    client.until(lambda: client.node.count_subscribers("/scenarios/info") >= 1, "the recorder")
+    run = hand_made_run()
+    for topic in TOPICS:
+        client.announce(topic)
+    messages = [(topic, data) for topic, data, _ in result_messages(run) if topic in TOPICS]
+    for topic, data in messages[1:]:  # the first is missing
+        client.say(topic, data)
+
+    def blamed():
+        return [
+            status.message
+            for status in client.statuses()
+            if status.name == "/recorder: losses"
+            and "/one and /test_client and /two publish" in status.message
+        ]
+
+    client.until(blamed, "the recorder to blame the publishers")
+    assert "disk" not in blamed()[-1]

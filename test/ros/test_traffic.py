@@ -7,7 +7,6 @@ from dataclasses import replace
 import json
 import math
 from pathlib import Path
-import subprocess
 import sys
 
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 from support.bag_examples import hand_made_run
 from support.message_decoders import decode_frames, decode_state
 from support.suite_processes import Client
+from typer.testing import CliRunner
 
 from msg_conventions.cdr import encode
 from msg_conventions.diagnostics import decode_diagnostics, Level
@@ -25,6 +25,7 @@ from msg_conventions.poses import decode_odometry, encode_odometry
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, request_summary
 from scenario_gen.bags.recordings.write import result_messages, write_recording
+from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
@@ -328,10 +329,6 @@ rclpy.spin(node)
 
 def test_planner_node_verdicts_equal_in_process(bag, tmp_path, monkeypatch):
     """`scenario-gen drive --ros`: any node that answers its odometry with a command; what it is not is said."""
-    from typer.testing import CliRunner
-
-    from scenario_gen.cli.commands import app
-
     program = tmp_path / "by_place.py"
     program.write_text(PLANNER)
     words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
@@ -378,7 +375,6 @@ def test_planner_may_call_step_itself(bag, tmp_path):
     """Both the command and the planner's call of traffic/step wait for one reply."""
     example = Path(__file__).parents[2] / "examples" / "ego_consumer.py"
     planner = f"{sys.executable} {example} --ros-args -p lock_step:=true"
-    command = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--count", "2", "--ros"]
-    command += ["--planner", planner, "--out", str(tmp_path / "out"), "--ego", "1"]
-    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=180.0)
-    assert (tmp_path / "out" / "drives.json").is_file(), ended.stdout + ended.stderr
+    words = ["drive", str(bag), "--count", "2", "--ros", "--planner", planner, "--ego", "1"]
+    ended = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")])
+    assert (tmp_path / "out" / "drives.json").is_file(), ended.output
