@@ -9,6 +9,7 @@ from support.signalised import crossing_map, signalised
 
 from scenario_gen import read_log
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.signals import sampled_schedule
 from scenario_gen.types import SignalSchedule
 
 
@@ -27,6 +28,15 @@ def test_table_with_states():
     assert lights["B"].yaw == pytest.approx(np.pi / 2.0, abs=0.01)
     later = encounter.select([0, 1], 20)
     assert later.lights[1].schedule.at(11.05 - at) == lights["B"].schedule.at(13.05 - at)
+
+
+def test_states_are_unknown_in_gaps():
+    """But for 0.4 of the gap on either side of it, 2 s at most."""
+    times = (0.0, 1.0, 2.0, 6.0, 7.0, 8.0, 18.0, 19.0)
+    schedule = sampled_schedule(times, ["green"] * len(times), "light")
+    for time in np.linspace(0.025, 19.025, 381):
+        is_unknown = 3.6 < time < 4.4 or 10.0 < time < 16.0
+        assert schedule.at(time) == ("unknown" if is_unknown else "green")
 
 
 def test_commonroad_with_cycles(tmp_path):
