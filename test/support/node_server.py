@@ -8,15 +8,17 @@ tests. Tests of the start itself (signals while the libraries load, an empty cac
 """
 
 import multiprocessing
+from multiprocessing import forkserver
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
 import tempfile
+from unittest import mock
 
 CONTEXT = multiprocessing.get_context("forkserver")
-CONTEXT.set_forkserver_preload(["loaded_nodes"])
+CONTEXT.set_forkserver_preload(["support.loaded_nodes"])
 SCRATCH = tempfile.TemporaryDirectory(prefix="nodes_of_tests_")
 
 STAND_INS = str(Path(__file__).resolve().parents[1] / "ros" / "stand_ins")
@@ -28,9 +30,7 @@ class Forked:
     def __init__(self, arguments: list[str], environment: dict[str, str], log: Path | None):
         self.args = arguments
         self.log = log or Path(tempfile.mkstemp(suffix=".log", dir=SCRATCH.name)[1])
-        self._process = CONTEXT.Process(
-            target=_become, args=(arguments, str(Path.cwd()), environment, str(self.log))
-        )
+        self._process = _process(_become, (arguments, str(Path.cwd()), environment, str(self.log)))
         self._process.start()
         self.pid = self._process.pid
 
@@ -75,7 +75,15 @@ def start_nodes(*arguments: str, log: Path | None = None, **environment: str) ->
 
 def process(target, args) -> multiprocessing.Process:
     """A process of the server in which `target` finds the environment of now."""
-    return CONTEXT.Process(target=_in_environment, args=(dict(os.environ), target, args))
+    return _process(_in_environment, (dict(os.environ), target, args))
+
+
+def _process(target, args) -> multiprocessing.Process:
+    """A process of the server, which is started with the path of this one: Python 3.11 does not tell it what to load from."""
+    path = os.pathsep.join(place for place in sys.path if place != STAND_INS)
+    with mock.patch.dict(os.environ, PYTHONPATH=path):
+        forkserver.ensure_running()
+    return CONTEXT.Process(target=target, args=args)
 
 
 def _in_environment(environment: dict[str, str], target, args) -> None:
@@ -96,6 +104,7 @@ def _become(arguments: list[str], folder: str, environment: dict[str, str], log:
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
+    assert "support.loaded_nodes" in sys.modules, "the server has loaded nothing"
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # as run_suite starts the server
     os.chdir(folder)
