@@ -19,12 +19,12 @@ from PIL import Image
 from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_typestore, Stores
-from support.bag_examples import hand_made_run
+from support.bag_examples import bag_topics, hand_made_run
 
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.parameters import loaded

@@ -13,9 +13,8 @@ import tempfile
 import unittest
 
 import pytest
+from support.bag_examples import bag_topics
 from support.skips import NO_LAUNCH
-
-from scenario_gen.bags.storage.bag import bag_topics
 
 launch_testing = pytest.importorskip("launch_testing", reason=NO_LAUNCH)
 actions = pytest.importorskip("launch.actions", reason=NO_LAUNCH)

@@ -11,12 +11,13 @@ import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+from support.bag_examples import bag_topics
 from support.log_builders import crossing, geographic, save
 from support.recording_files import tracked
 
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.definitions import definition, type_store
 from scenario_gen.bags.vehicles import decode_samples, FIX, ODOMETRY, POSE, TRANSFORMS, TWIST
 from scenario_gen.base.errors import InputError

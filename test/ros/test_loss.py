@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 import pytest
+from support.bag_examples import bag_topics
 from support.lengths import LONG
 from support.suite_processes import Processes, RESOURCES
 from typer.testing import CliRunner
@@ -26,7 +27,7 @@ from msg_conventions.scenario_info import (
     ScenarioEntry,
 )
 from msg_conventions.scenarios import digest, encode_scenario
-from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app

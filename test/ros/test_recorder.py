@@ -10,11 +10,11 @@ import time
 
 from mcap.reader import make_reader
 import pytest
-from support.bag_examples import hand_made_run
+from support.bag_examples import bag_topics, hand_made_run
 from support.suite_processes import Client, RESOURCES
 
 from scenario_gen.bags.recordings.write import result_messages
-from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.bag import read_messages
 
 pytestmark = pytest.mark.dds
 

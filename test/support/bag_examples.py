@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.bags.storage.messages import BagMessage
+from scenario_gen.bags.storage.bag import open_bag, read_messages
+from scenario_gen.bags.storage.messages import BagMessage, BagTopic
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.output.review.evaluation import BagEvaluation
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
@@ -19,6 +19,12 @@ from scenario_gen.types.fit import Fit, FittedVehicle, Route, Segmentation
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
+
+
+def bag_topics(bag: Path) -> tuple[BagTopic, ...]:
+    """Return the topics of a bag by name."""
+    with open_bag(bag) as opened:
+        return opened.topics()
 
 
 def copied(bag: Path, target: Path, change: Callable[[BagMessage], bytes | None]) -> Path:

@@ -202,20 +202,6 @@ def naming_bag(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: {error}") from error
 
 
-def bag_topics(path: Path, config: BagConfig = BagConfig()) -> tuple[BagTopic, ...]:
-    """Return the topics of a bag by name.
-
-    Args:
-        path: its folder, or one of its files.
-        config: bounds of reading it.
-
-    Raises:
-        InputError: the bag does not exist, or is damaged.
-    """
-    with open_bag(path, config) as bag:
-        return bag.topics()
-
-
 def bag_warnings(path: Path) -> tuple[str, ...]:
     """Return a line for each part of a bag that is missing, and for what was not recorded.
 

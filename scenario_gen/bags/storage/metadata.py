@@ -12,55 +12,44 @@ import yaml
 from scenario_gen.bags.storage.files import NOT_RECORDED
 from scenario_gen.types import Quality
 
-_MAX_STAMP_NS = 2**63 - 1
-
 
 @dataclass
 class TopicInfo:
-    """The metadata of a topic."""
+    """The metadata of a topic; `channel` is its number in the file."""
 
     name: str
     type: str
     quality: Quality
     type_hash: str
+    channel: int
     count: int = 0
-
-
-@dataclass
-class FileInfo:
-    """The metadata of a file."""
-
-    path: str
-    start_ns: int = _MAX_STAMP_NS
-    end_ns: int = 0
-    count: int = 0
-
-    def add(self, stamp_ns: int) -> None:
-        """Count a message."""
-        self.start_ns = min(self.start_ns, stamp_ns)
-        self.end_ns = max(self.end_ns, stamp_ns)
-        self.count += 1
-
-
-def _statistics(file: FileInfo) -> dict[str, Any]:
-    """Return first stamp, duration and count of a file as in metadata.yaml; zeros if empty."""
-    start_ns = file.start_ns if file.count else 0
-    return {
-        "starting_time": {"nanoseconds_since_epoch": start_ns},
-        "duration": {"nanoseconds": file.end_ns - start_ns},
-        "message_count": file.count,
-    }
 
 
 def metadata_yaml(
-    topics: Sequence[TopicInfo], file: FileInfo, not_recorded: Mapping[str, str]
+    file: str,
+    topics: Sequence[TopicInfo],
+    span_ns: tuple[int, int],
+    not_recorded: Mapping[str, str],
 ) -> str:
-    """Return the text of metadata.yaml; `not_recorded` says by topic what is missing."""
+    """Return the text of metadata.yaml of a bag with one file.
+
+    Args:
+        file: its name.
+        topics: its topics.
+        span_ns: first and last stamp; the first is the larger one if it is empty.
+        not_recorded: says by topic what is missing.
+    """
+    first_ns = min(span_ns)
+    statistics = {
+        "starting_time": {"nanoseconds_since_epoch": first_ns},
+        "duration": {"nanoseconds": span_ns[1] - first_ns},
+        "message_count": sum(topic.count for topic in topics),
+    }
     custom = {f"{NOT_RECORDED}{topic}": text for topic, text in not_recorded.items()}
     document = {
         "version": 9,
         "storage_identifier": "mcap",
-        **_statistics(file),
+        **statistics,
         "topics_with_message_count": [
             {
                 "topic_metadata": {
@@ -76,33 +65,38 @@ def metadata_yaml(
         ],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file.path],
-        "files": [{"path": file.path, **_statistics(file)}],
+        "relative_file_paths": [file],
+        "files": [{"path": file, **statistics}],
         "custom_data": custom or None,
         "ros_distro": "jazzy",
     }
     return _dump({"rosbag2_bagfile_information": document})
 
 
+class _Dumper(yaml.CSafeDumper):  # type: ignore[misc]
+    """Writes no anchors, which rosbag2's YAML reader does not accept."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
 def _dump(value: Any) -> str:
     """Return YAML in the given order."""
-    text: str = yaml.dump(value, Dumper=yaml.CSafeDumper, sort_keys=False)
+    text: str = yaml.dump(value, Dumper=_Dumper, sort_keys=False)
     return text
 
 
 def _profiles(quality: Quality) -> list[dict[str, Any]]:
-    """Return an offered QoS profile in the list that rosbag2 writes.
-
-    Each duration is rmw's infinite one, and an object of its own: rosbag2's YAML reader accepts no
-    anchors.
-    """
-    durations = ("deadline", "lifespan", "liveliness_lease_duration")
+    """Return an offered QoS profile in the list that rosbag2 writes."""
+    infinite = {"sec": 9223372036, "nsec": 854775807}  # as rmw's
     profile = {
         "history": "keep_last",
         "depth": quality.depth,
         "reliability": "reliable" if quality.reliable else "best_effort",
         "durability": "transient_local" if quality.transient_local else "volatile",
-        **{name: {"sec": 9223372036, "nsec": 854775807} for name in durations},
+        "deadline": infinite,
+        "lifespan": infinite,
+        "liveliness_lease_duration": infinite,
         "liveliness": "automatic",
         "avoid_ros_namespace_conventions": False,
     }

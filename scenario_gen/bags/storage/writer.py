@@ -4,24 +4,24 @@
 """A bag as rosbag2 (Jazzy) writes it: MCAP files of raw CDR messages, and metadata.yaml."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
 from scenario_gen.bags.storage.definitions import definition
 from scenario_gen.bags.storage.files import METADATA
-from scenario_gen.bags.storage.metadata import FileInfo, metadata_yaml, qos_yaml, TopicInfo
+from scenario_gen.bags.storage.metadata import metadata_yaml, qos_yaml, TopicInfo
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, naming, replaced_folder, sync, write_text
 from scenario_gen.types import Quality
 
 _WRITTEN = Kind("bag")
+_MAX_STAMP_NS = 2**63 - 1
 
 
-class BagWriter:
+class BagWriter(AbstractContextManager["BagWriter"]):
     """Writes one bag; a context manager.
 
     Each full chunk is flushed, so that a killed process loses its last chunk only; see `flush`.
@@ -55,26 +55,14 @@ class BagWriter:
             raise InputError(
                 f"{folder} already exists; remove it, or name another folder for the bag"
             ) from None
-        self._file = FileInfo(f"{folder.name}_0.mcap")
+        self._span_ns = (_MAX_STAMP_NS, 0)  # first and last stamp
         self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
         compression = CompressionType.ZSTD if compress else CompressionType.NONE
-        path = folder / self._file.path
-        with naming(path):
-            self._stream = path.open("xb")
+        self._path = folder / f"{folder.name}_0.mcap"
+        with naming(self._path):
+            self._stream = self._path.open("xb")
             self._writer = Writer(self._stream, chunk_size=chunk_bytes, compression=compression)
             self._writer.start(profile="ros2", library="scenario_gen")
-
-    def _close_file(self) -> None:
-        path = self.folder / self._file.path
-        with naming(path):
-            self._writer.add_metadata("rosbag2", {"serialized_metadata": self._metadata()})
-            self._writer.finish()
-            self._stream.close()
-        sync(path)
-
-    def _metadata(self) -> str:
-        return metadata_yaml(list(self.topics.values()), self._file, self.not_recorded)
 
     def add_topic(
         self, name: str, kind: str, quality: Quality = Quality(), type_hash: str = ""
@@ -93,17 +81,15 @@ class BagWriter:
         if name in self.topics:
             return
         text, computed_hash = definition(kind)
-        topic = TopicInfo(name, kind, quality, type_hash or computed_hash)
-        self.topics[name] = topic
+        type_hash = type_hash or computed_hash
         if kind not in self._schemas:
             self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text.encode())
         metadata = {
             "offered_qos_profiles": qos_yaml(quality),
-            "topic_type_hash": topic.type_hash,
+            "topic_type_hash": type_hash,
         }
-        self._channels[name] = self._writer.register_channel(
-            name, "cdr", self._schemas[kind], metadata
-        )
+        channel = self._writer.register_channel(name, "cdr", self._schemas[kind], metadata)
+        self.topics[name] = TopicInfo(name, kind, quality, type_hash, channel)
 
     def write(self, name: str, data: bytes, stamp_ns: int) -> None:
         """Append a CDR message of a topic that was added, logged at `stamp_ns`.
@@ -119,14 +105,15 @@ class BagWriter:
         topic = self.topics[name]
         with self._writing():
             self._writer.add_message(
-                self._channels[name],
+                topic.channel,
                 log_time=stamp_ns,
                 data=data,
                 publish_time=stamp_ns,
                 sequence=topic.count,
             )
             self._stream.flush()  # a full chunk, which the writer has just written
-        self._file.add(stamp_ns)
+        first_ns, last_ns = self._span_ns
+        self._span_ns = min(first_ns, stamp_ns), max(last_ns, stamp_ns)
         topic.count += 1
 
     @contextmanager
@@ -135,7 +122,7 @@ class BagWriter:
         try:
             yield
         except OSError as error:
-            error.filename = str(self.folder / self._file.path)
+            error.filename = str(self._path)
             self._failed = True
             raise
 
@@ -157,9 +144,15 @@ class BagWriter:
         """
         try:
             if not self._failed:
-                self._close_file()
+                topics = list(self.topics.values())
+                text = metadata_yaml(self._path.name, topics, self._span_ns, self.not_recorded)
+                with naming(self._path):
+                    self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
+                    self._writer.finish()
+                    self._stream.close()
+                sync(self._path)
                 partial = self.folder / f"{METADATA}.partial"
-                write_text(partial, self._metadata())
+                write_text(partial, text)
                 sync(partial)
                 partial.replace(self.folder / METADATA)
                 sync(self.folder)
@@ -167,15 +160,7 @@ class BagWriter:
             with suppress(OSError):
                 self._stream.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

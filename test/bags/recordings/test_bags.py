@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
-from support.bag_examples import hand_made_run
+from support.bag_examples import bag_topics, hand_made_run
 import yaml
 
 from msg_conventions.scenario_info import INFO
@@ -24,7 +24,7 @@ from msg_conventions.scenarios import messages_of
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import result_messages, write_recording
-from scenario_gen.bags.storage.bag import bag_topics, bag_warnings, read_messages
+from scenario_gen.bags.storage.bag import bag_warnings, read_messages
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log

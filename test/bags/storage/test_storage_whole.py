@@ -10,9 +10,10 @@ import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
+from support.bag_examples import bag_topics
 from support.cut_bags import mcap_bytes
 
-from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 
