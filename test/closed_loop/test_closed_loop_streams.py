@@ -5,6 +5,7 @@
 
 import numpy as np
 import pytest
+from support.motions import as_scenario
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.ego import Command
@@ -15,7 +16,6 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.situation import Situation
-from scenario_gen.types import Scenario
 
 
 class Departs(RouteFollower):
@@ -34,14 +34,6 @@ def stream():
     """Return the stream of a recorded crossing in which vehicle 2 yields."""
     encounter = read_log("examples/my_log.csv").encounters[0]
     return Stream.of(encounter, encounter.ids.index("2"))
-
-
-def scenario_of(encounter):
-    fields = (encounter.position, encounter.heading, encounter.speed)
-    rates = np.gradient(encounter.speed, encounter.dt, axis=1)
-    return Scenario(
-        encounter.vehicles, encounter.time, *fields, rates, 0, 0, present=encounter.present
-    )
 
 
 @pytest.mark.parametrize("queue", (0.0, 4.0))
@@ -63,7 +55,7 @@ def test_stream_has_one_gap_on_time(stream, queue):
 
 
 def test_insisting_vehicle_awaits_no_late_ego(stream):
-    loop = ClosedLoop(scenario_of(stream.open_at(8.0, 0.0, 0.1)), 0)
+    loop = ClosedLoop(as_scenario(stream.open_at(8.0, 0.0, 0.1)), 0)
     assert loop.insists.sum() == len(loop.conflicts)
     verdicts = {wait: judge(loop, loop.drive(Departs(wait))) for wait in (3.0, 6.2, 10.0)}
     assert verdicts[6.2].passed and not verdicts[6.2].took_turn

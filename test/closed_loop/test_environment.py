@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
 from support.driving_scenes import following
+from support.motions import road_of
 
 from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.environment import DriveEnv, ID
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.types import Road
 
 TRIALS = [Trial(str(seed), draw_scenario(seed), 0, None) for seed in (1, 2, 5)]
 
@@ -82,9 +82,7 @@ def test_off_road_agrees_with_the_verdict(edge):
     """A footprint that is outside by less than counts goes on."""
     scenario = following(8.0, 20.0)  # along y = 0
     corner = np.array((-200.0, edge - 0.5 * scenario.vehicles[0].width))
-    road = Road(
-        "r", np.ones((400, 400), dtype=bool), 1.0, corner, np.zeros((0, 3)), np.zeros((0, 3))
-    )
+    road = road_of(np.ones((400, 400), dtype=bool), 1.0, corner)
     env = DriveEnv([Trial("edge", scenario, 0, road)])
     env.reset(seed=1)
     _, reward, terminated, _, info = env.step(np.array((-1.0, 0.0), dtype=np.float32))

@@ -5,6 +5,7 @@
 
 import numpy as np
 import pytest
+from support.driving_scenes import Acts
 from support.lengths import LONG
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
@@ -335,19 +336,15 @@ def placed(motion, angle, mirrored):
     return xy, side * yaw + angle, speed
 
 
-class Plays:
-    """Is where a motion has it."""
+def plays(motion):
+    """Return a planner that is where a motion has it."""
 
-    def __init__(self, motion):
-        self.motion = motion
-
-    def reset(self, task):
-        pass
-
-    def act(self, seen):
+    def act(seen):
         k = min(round(seen.time / PERIOD) + 1, STEPS - 1)
-        (x, y), yaw, speed = (each[k] for each in self.motion)
+        (x, y), yaw, speed = (each[k] for each in motion)
         return Pose(float(x), float(y), float(yaw), float(speed))
+
+    return Acts(act)
 
 
 def judged(situation, seed):
@@ -357,11 +354,11 @@ def judged(situation, seed):
     loop = ClosedLoop(
         as_scenario([witness, other], STEPS), 0, config=ClosedLoopConfig(policy="replay")
     )
-    proven = judge(loop, loop.drive(Plays(witness)))
+    proven = judge(loop, loop.drive(plays(witness)))
     assert proven.passed, (
         f"{situation.__name__} {seed}: {proven.sentence()}; {find_conflicts(loop.scenario)}"
     )
-    return judge(loop, loop.drive(Plays(ego)))
+    return judge(loop, loop.drive(plays(ego)))
 
 
 @pytest.mark.parametrize("situation", SITUATIONS, ids=lambda one: one.__name__)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from support.driving_scenes import Acts
 from support.lengths import LONG
 
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
@@ -47,21 +48,13 @@ def scene(*motions):
     return replace(as_scenario(motions, len(TIME)), vehicles=vehicles)
 
 
-class Accelerates:
-    """Drives straight on with what a function gives of what it sees [m/s²]."""
-
-    def __init__(self, wish):
-        self.wish = wish
-
-    def reset(self, task):
-        pass
-
-    def act(self, seen):
-        return Command(self.wish(seen), 0.0)
+def accelerates(wish):
+    """Return a planner that drives straight on with what a function gives of what it sees [m/s²]."""
+    return Acts(lambda seen: Command(wish(seen), 0.0))
 
 
-KEEPS = Accelerates(lambda seen: 0.0)
-BRAKES = Accelerates(lambda seen: -2.0 if seen.ego.x > -25.0 else 0.0)
+KEEPS = accelerates(lambda seen: 0.0)
+BRAKES = accelerates(lambda seen: -2.0 if seen.ego.x > -25.0 else 0.0)
 
 
 @pytest.mark.parametrize("walks", [0.8, 1.4, 2.0])
@@ -102,7 +95,7 @@ def test_pedestrian_precedes_stopping_car():
 def test_pedestrian_on_lane_convicts_the_ego():
     """The ego brakes until the pedestrian is on its lane, then speeds up."""
     scenario = scene(waiting_car(7.0, 16.0), walker(-9.0))
-    hits = Accelerates(
+    hits = accelerates(
         lambda seen: (
             -2.0 if seen.others[0, 1] < -1.0 and seen.ego.x > -25.0 else 4.0 * (seen.ego.x > -25.0)
         )
@@ -118,7 +111,7 @@ def test_pedestrian_waits_until_patience_ends():
     """The ego stands 10 m before the crossing; who waits for it does so beside the lane, not on it."""
     car = np.stack([-30.0 + 8.0 * TIME, ZERO], axis=1), ZERO, ZERO + 8.0
     loop = ClosedLoop(scene(car, walker(-10.0)), 0, config=ClosedLoopConfig(patience=4.0))
-    drive = loop.drive(Accelerates(lambda seen: -4.0), lambda state: state.step >= 230)
+    drive = loop.drive(accelerates(lambda seen: -4.0), lambda state: state.step >= 230)
     stands = drive.motion.speed[1] < 0.05
     assert 0.1 * stands.sum() == pytest.approx(loop.traits.patience[1], abs=1.0)
     assert drive.motion.position[1, -1, 1] > 3.0

@@ -1,37 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Depth and room of a footprint against every pair of a point and a cell."""
+"""Depth and room of a footprint, against shapely's distances."""
 
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shapely
+from support.motions import road_of
 
 from scenario_gen.closed_loop.off_road import _depth, is_off_road, MAX_DEPTH_M, road_use
 from scenario_gen.types import LaneNetwork, Motion, Obstacle, Vehicle
-from scenario_gen.types.road import Road
 
 HALF = (2.0, 0.9)
 
 
-def plain(drivable, res, pose):
-    """Greatest depth [m] by comparing points 2 cm apart with every drivable cell."""
+def plain(cells, pose):
+    """Greatest distance [m] of points 2 cm apart from the nearest drivable cell, by shapely."""
     x, y = np.meshgrid(np.linspace(-HALF[0], HALF[0], 201), np.linspace(-HALF[1], HALF[1], 91))
     c, s = np.cos(pose[2]), np.sin(pose[2])
-    px, py = (pose[0] + c * x - s * y).ravel() / res, (pose[1] + s * x + c * y).ravel() / res
-    nearest = np.full(len(px), np.inf)
-    for row, column in np.argwhere(drivable):
-        du = np.maximum(np.maximum(column - px, px - column - 1), 0.0)
-        dv = np.maximum(np.maximum(row - py, py - row - 1), 0.0)
-        nearest = np.minimum(nearest, np.hypot(du, dv))
-    return min(nearest.max() * res, MAX_DEPTH_M)
-
-
-def road_of(drivable, res):
-    """A road without lanes; its lower left corner is the origin."""
-    return Road("patches", drivable, res, np.zeros(2), np.empty((0, 3)), np.empty((0, 3)))
+    points = shapely.points(pose[0] + c * x - s * y, pose[1] + s * x + c * y)
+    _, away = cells.query_nearest(points.ravel(), return_distance=True, all_matches=False)
+    return min(away.max(), MAX_DEPTH_M)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -44,8 +36,11 @@ def test_depth_is_of_the_deepest_point(seed):
     poses = np.column_stack(
         [rng.uniform(-2.0, 30.0 * res + 2.0, (20, 2)), rng.uniform(-3.0, 3.0, 20)]
     )
-    measured = [_depth(road_of(drivable, res), pose[None], HALF) for pose in poses]
-    expected = [plain(drivable, res, pose) for pose in poses]
+    road = road_of(drivable, res)
+    measured = [_depth(road, pose[None], HALF) for pose in poses]
+    low = np.argwhere(drivable)[:, ::-1] * res
+    cells = shapely.STRtree(shapely.box(*low.T, *(low + res).T))
+    expected = [plain(cells, pose) for pose in poses]
     assert measured == pytest.approx(expected, abs=0.014)  # a point may lie between two of 2 cm
     assert np.ptp(expected) > 0.5
 

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from support.driving_scenes import crossing, following
+from support.driving_scenes import Acts, crossing, following
 from support.lengths import LONG
 
 from benchmarks._drive_others import braking_jerks
@@ -220,7 +220,7 @@ def test_slower_ego_is_not_overtaken_closely(beside, passes):
 def test_nobody_brakes_for_ego_from_behind(faster):
     """The ego speeds up behind a vehicle on its path, up to the contact."""
     loop = ClosedLoop(following(8.0, 12.0), 0)
-    drive = loop.drive(Pushes(8.0 + faster), lambda state: loop.hit(state) or state.step >= 100)
+    drive = loop.drive(pushes(8.0 + faster), lambda state: loop.hit(state) or state.step >= 100)
     assert np.abs(drive.motion.speed[1] - 8.0).max() < 1e-6
 
 
@@ -228,23 +228,17 @@ def test_nobody_brakes_for_ego_from_behind(faster):
 def test_nobody_stops_at_reference_end(late):
     """The reference of the ego ends at 6 s before a vehicle that follows; the ego goes on."""
     scenario = replace(following(10.0, 15.0), present=np.array([[0, 149], [0, 60]]))
-    drive = ClosedLoop(scenario, 1).drive(Pushes(10.0, late), lambda state: state.step >= 140)
+    drive = ClosedLoop(scenario, 1).drive(pushes(10.0, late), lambda state: state.step >= 140)
     assert drive.motion.speed[0, 40:].min() > 8.0 - late and drive.motion.speed[0, -1] > 9.9
 
 
-class Pushes:
-    """Drives straight on to a speed [m/s]; brakes lightly for a time [s] before."""
+def pushes(speed, late=0.0):
+    """Return a planner that drives straight on to a speed [m/s]; it brakes lightly for a time [s] before."""
 
-    def __init__(self, speed, late=0.0):
-        self.speed, self.late = speed, late
+    def act(seen):
+        return Command(-1.0 if seen.time < late else min(2.0 * (speed - seen.ego.speed), 3.0), 0.0)
 
-    def reset(self, task):
-        """Begin."""
-
-    def act(self, seen):
-        if seen.time < self.late:
-            return Command(-1.0, 0.0)
-        return Command(min(2.0 * (self.speed - seen.ego.speed), 3.0), 0.0)
+    return Acts(act)
 
 
 @pytest.mark.parametrize("policy", ["reactive", "committed"])

@@ -10,6 +10,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from support.driving_scenes import Acts
+from support.motions import road_of
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from benchmarks.drive import seen_at
@@ -23,7 +25,6 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import rates, run_trials
 from scenario_gen.closed_loop.verdict import judge, Runner
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.types.road import Road
 
 TIME = np.arange(150) * PERIOD
 
@@ -41,14 +42,7 @@ def verdict_of(motions, act, policy="replay", road=None, **config):
         as_scenario(motions, len(TIME)), 0, road, ClosedLoopConfig(policy=policy, **config)
     )
 
-    class Planner:
-        def reset(self, task):
-            pass
-
-        def act(self, seen):
-            return act(seen)
-
-    drive = loop.drive(Planner())
+    drive = loop.drive(Acts(act))
     return judge(loop, drive), drive
 
 
@@ -85,8 +79,7 @@ def strip(half_width):
     """A road along the x axis, so many metres [m] to either side of it."""
     drivable = np.zeros((100, 1000), dtype=np.bool_)
     drivable[np.abs(0.2 * (np.arange(100) + 0.5) - 10.0) < half_width] = True
-    no = np.empty((0, 3))
-    return Road("strip", drivable, 0.2, np.array((-20.0, -10.0)), no, no)
+    return road_of(drivable, 0.2, (-20.0, -10.0))
 
 
 BESIDE = [straight(0, 0, 0, 10.0), straight(0.0, 50.0, 0, 10.0)]  # too far to meet

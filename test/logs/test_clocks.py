@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.log_builders import crossing, save
+from support.motions import encounter_of
 
 from scenario_gen.logs import Meeting, read_log, Streams
 from scenario_gen.logs.bag_names import clock_doubts, TopicClock
@@ -19,7 +20,6 @@ from scenario_gen.logs.extract import encounter_quality
 from scenario_gen.logs.growing import Growth
 from scenario_gen.logs.stamps import time_of_day
 from scenario_gen.logs.table_parts import apart_by_scene
-from scenario_gen.types import Encounter, Vehicle
 
 S_TO_NS = 10**9
 TIMES = pd.Series(pd.date_range("2026-05-01 08:58:50.5", periods=140, freq="1s"))
@@ -125,11 +125,7 @@ def two(offset, present=((0, 60), (0, 60)), speed=2.0):
     """Two vehicles that drive east for 6 s, at an offset (2,) [m]."""
     x = 0.1 * speed * np.arange(61)
     position = np.stack([np.stack([x, 0.0 * x], axis=-1) + at for at in ((0.0, 0.0), offset)])
-    flat = np.zeros((2, 61))
-    vehicles = (Vehicle("a"), Vehicle("b"))
-    return Encounter.sampled(
-        vehicles, 0.1, position, flat, flat + speed, "two", present=np.array(present)
-    )
+    return encounter_of(position, speed=speed, present=np.array(present))
 
 
 @pytest.mark.parametrize(
@@ -152,7 +148,7 @@ def test_partly_present_vehicles_are_named():
     whole = encounter_quality(two((0.0, 9.0)))
     partly = encounter_quality(two((0.0, 9.0), ((0, 60), (5, 60))))
     assert whole.partly == () and whole.seconds == pytest.approx(6.0)
-    assert partly.partly == (("b", pytest.approx(0.5), pytest.approx(6.0)),)
+    assert partly.partly == (("2", pytest.approx(0.5), pytest.approx(6.0)),)
 
 
 @pytest.mark.parametrize("more", [0, 1, 5])

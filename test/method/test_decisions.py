@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 from support.textbook_motions import labelled, REACTIONS
 
 from msg_conventions.tracks import decode_tracks
@@ -19,7 +20,7 @@ from scenario_gen.method.decisions import DecidedConflict, goes_first_probabilit
 from scenario_gen.method.outcome_sets import drawn_sizes, requested_decisions
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.situation import conflict_of, passing, Situation
-from scenario_gen.types import Decided, Encounter, NoteKind, Outcome, Request, YIELD
+from scenario_gen.types import Decided, NoteKind, Outcome, Request, YIELD
 
 DRAWN = sg.PipelineConfig(sampling=sg.SamplingConfig(decisions="drawn"))
 WAITS = "crossing, stops"
@@ -146,9 +147,8 @@ def crossing(*knots, first_begin=-70.0, second_begin=-55.0):
     along = np.array([[first_begin], [second_begin]]) + 0.1 * np.cumsum(speed, axis=1)
     position = np.zeros((2, len(time), 2))
     position[0, :, 0], position[1, :, 1] = along
-    heading = np.tile([[0.0], [0.5 * np.pi]], len(time))
     vehicles = (sg.Vehicle("i", 4.6, 1.9), sg.Vehicle("j", 4.6, 1.9))
-    return Encounter.sampled(vehicles, 0.1, position, heading, speed, "crossing")
+    return encounter_of(position, np.array([[0.0], [0.5 * np.pi]]), speed, vehicles)
 
 
 def lag_of(encounter):

@@ -6,6 +6,7 @@
 import numpy as np
 import pytest
 from support.lengths import LOGS
+from support.motions import encounter_of
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
@@ -13,7 +14,6 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.situation import Situation
 from scenario_gen.situation.separation import smallest_gaps
-from scenario_gen.types import Encounter, Vehicle
 
 ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
 
@@ -83,14 +83,7 @@ def test_corridor_lane_holds_who_shares_it():
     time = np.arange(0.0, 10.05, 0.1)
     starts, speeds = np.array([0.0, -20.0, -45.0]), np.array([7.0, 7.2, 7.5])
     x = starts[:, None] + speeds[:, None] * time
-    encounter = Encounter.sampled(
-        tuple(Vehicle(name) for name in "abc"),
-        0.1,
-        np.stack([x, np.zeros_like(x)], axis=-1),
-        np.zeros_like(x),
-        np.broadcast_to(speeds[:, None], x.shape),
-        "platoon",
-    )
+    encounter = encounter_of(np.stack([x, 0.0 * x], axis=-1), speed=speeds[:, None])
     (lane,) = build_road("corridor", encounter).lanes.lanes
     half = 0.5 * encounter.vehicles[0].length
     assert lane.centre[:, 0].min() < x.min() - half

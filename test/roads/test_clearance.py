@@ -7,24 +7,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from shapely import affinity
+from shapely import area, intersection
 from shapely.geometry import box, LineString, Point
 from shapely.ops import unary_union
+from support import motions
+from support.oracle import footprints
 
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room, segments_free
 from scenario_gen.roads.connectivity import free_cells, free_space, FreeSpace
-from scenario_gen.types.road import Road
 
 
 def road_of(drivable, resolution=1.0, origin=(0.0, 0.0)):
-    return Road(
-        "grid",
-        np.asarray(drivable, dtype=bool),
-        resolution,
-        np.array(origin),
-        np.empty((0, 3)),
-        np.empty((0, 3)),
-    )
+    return motions.road_of(np.asarray(drivable, dtype=bool), resolution, origin)
 
 
 def random_road(rng, shape=(12, 15), density=0.25, resolution=0.5, origin=(-3.0, 2.0)):
@@ -97,17 +91,12 @@ def test_footprints_against_shapely():
         poses = np.column_stack(
             [rng.uniform((-3.0, 2.0), (4.5, 8.0), (300, 2)), rng.uniform(-4.0, 4.0, 300)]
         )
-        for pose, fits in zip(poses, footprint_fits(road, poses, 1.7, 0.8), strict=True):
-            shape = affinity.translate(
-                affinity.rotate(
-                    box(-0.85, -0.4, 0.85, 0.4), pose[2], origin=(0, 0), use_radians=True
-                ),
-                *pose[:2],
-            )
-            overlap = shape.intersection(blocked).area
-            if overlap == 0.0 or overlap > 1e-7:
-                assert fits == (overlap == 0.0)
-                seen.add(bool(fits))
+        shapes = footprints(poses[:, :2], poses[:, 2], 1.7, 0.8)
+        overlaps = area(intersection(shapes, blocked))
+        is_clear = (overlaps == 0.0) | (overlaps > 1e-7)
+        fits = footprint_fits(road, poses, 1.7, 0.8)[is_clear]
+        np.testing.assert_array_equal(fits, overlaps[is_clear] == 0.0)
+        seen |= set(fits.tolist())
     assert seen == {True, False}
 
 

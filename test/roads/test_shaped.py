@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.motions import encounter_of_drives as made
 from support.source_files import ROOT
 from support.textbook_motions import labelled
 
@@ -19,7 +20,7 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, RuleKind, Trailer, Vehicle
+from scenario_gen.types import RuleKind, Trailer, Vehicle
 from scenario_gen.types.fit import Segmentation
 
 T = 140
@@ -44,12 +45,6 @@ def bend(angle, radius, before):
     arc = np.column_stack((before + r * np.sin(a), r * (1.0 - np.cos(a))))
     rest = np.arange(1.0, 120.0)[:, None] * np.array([np.cos(angle), np.sin(angle)])
     return np.vstack((first, arc, arc[-1] + rest))
-
-
-def made(*motions, width=1.9):
-    poses, speed = np.stack([m[0] for m in motions]), np.stack([m[1] for m in motions])
-    vehicles = tuple(Vehicle(str(i), 4.8, width) for i in range(len(poses)))
-    return Encounter.sampled(vehicles, 0.1, poses[..., :2], poses[..., 2], speed, "made")
 
 
 def ring_of(road):

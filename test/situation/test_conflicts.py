@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 import shapely
+from support.motions import encounter_of
+from support.oracle import footprints
 
 from scenario_gen.situation import find_conflicts, find_waits, Wait
-from scenario_gen.types import Encounter, Motion, Vehicle
+from scenario_gen.types import Motion, Vehicle
 
 CARS = (Vehicle("a"), Vehicle("b"))
 TIME = np.arange(101) * 0.1
@@ -34,14 +36,7 @@ def conflicts(*tracks, vehicles=CARS, time=TIME):
 
 
 def encounter(speed):
-    n, t = speed.shape
-    return Encounter.sampled(CARS[:n], 0.1, np.zeros((n, t, 2)), np.zeros((n, t)), speed, "test")
-
-
-def box(length, width, x, y, yaw):
-    corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * (0.5 * length, 0.5 * width)
-    rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    return shapely.Polygon(corners @ rotation.T + (x, y))
+    return encounter_of(np.zeros((*speed.shape, 2)), 0.0, speed, CARS[: len(speed)])
 
 
 def test_crossing_is_ordered_by_first_entry():
@@ -154,7 +149,8 @@ DEPTH = 2e-6  # m by which the oracle's boxes are smaller, so that what still me
 
 
 def boxes_of(vehicle, poses, grow=0.0):
-    return [box(vehicle.length + grow, vehicle.width + grow, *pose) for pose in poses]
+    size = vehicle.length + grow, vehicle.width + grow
+    return footprints(poses[:, :2], poses[:, 2], *size)
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -6,10 +6,10 @@
 from hypothesis import given, strategies
 import numpy as np
 import pytest
+from support.motions import encounter_of
 from support.textbook_motions import labelled, NOTHING, REACTIONS
 
 from scenario_gen.situation import EncounterKind, kind_of
-from scenario_gen.types import Encounter, Vehicle
 
 EXPECTED = {
     **dict.fromkeys((*REACTIONS, *NOTHING), EncounterKind.FOLLOWING),
@@ -58,14 +58,8 @@ def test_kind_ignores_direction_and_order(turned, case):
     station = 10.0 * (time - 6.0)
     east, north = x + station * np.cos(heading), y + station * np.sin(heading)
     cos, sin = np.cos(turned), np.sin(turned)
-    encounter = Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")),
-        0.1,
-        np.stack([cos * east - sin * north, sin * east + cos * north], axis=-1),
-        np.broadcast_to(heading + turned, (2, len(time))),
-        np.full((2, len(time)), 10.0),
-        "straight",
-    )
+    place = np.stack([cos * east - sin * north, sin * east + cos * north], axis=-1)
+    encounter = encounter_of(place, heading + turned)
     assert kind_of(encounter, 0, 1) == kind == kind_of(encounter, 1, 0)
 
 
@@ -76,12 +70,6 @@ def test_followers_share_seven_tenths_of_path(on_path, kind):
     """Of the 20 samples of the last quarter; afterwards the follower is beside that path."""
     x = 3.0 * np.arange(80)
     beside = np.where(np.arange(80) >= 60 + on_path, 5.0, 0.0)
-    encounter = Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")),
-        0.3,
-        np.stack([np.column_stack([x + 40.0, np.zeros(80)]), np.column_stack([x, beside])]),
-        np.zeros((2, 80)),
-        np.full((2, 80), 10.0),
-        "leaves the path",
-    )
+    ways = np.column_stack([x + 40.0, np.zeros(80)]), np.column_stack([x, beside])
+    encounter = encounter_of(np.stack(ways), dt=0.3)
     assert kind_of(encounter, 0, 1) == kind

@@ -9,6 +9,7 @@ import itertools
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
@@ -16,9 +17,9 @@ from scenario_gen.situation import Conflict, interaction_windows, kind_of, Situa
 from scenario_gen.situation.reactions import without_circles
 from scenario_gen.situation.separation import least_gaps
 from scenario_gen.situation.yielding import _enters_from_beside, Recording
-from scenario_gen.types import Encounter, FOLLOW, Reaction, Vehicle, YIELD
+from scenario_gen.types import FOLLOW, Reaction, Vehicle, YIELD
 
-TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))
+TWO = tuple(map(Vehicle, "12"))
 
 
 @pytest.mark.parametrize("lag", [0.6, 1.2, 2.0])
@@ -195,8 +196,7 @@ def test_angled_entry_comes_from_beside(frame, left, turned, beside):
     time = np.arange(101) * 0.1
     ways = np.stack([[8.0 * time, 0.0 * time], [8.0 * time + 10.0, 0.0 * time + left]])
     position = np.moveaxis(ways, 1, 2) @ along
-    heading = np.full((2, 101), frame) + np.array([[0.0], [turned]])
-    encounter = Encounter.sampled(AB, 0.1, position, heading, np.full((2, 101), 8.0), "two")
+    encounter = encounter_of(position, frame + np.array([[0.0], [turned]]), 8.0)
     recording = Recording(encounter, Situation.of(encounter).tracks, (), ())
     conflict = Conflict(0, 1, False, 3.0, 4.0, 5.0, 6.0)
     assert _enters_from_beside(recording, conflict) == beside

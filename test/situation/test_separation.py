@@ -5,11 +5,12 @@
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.situation import clean_tracks, interaction_windows, Situation
 from scenario_gen.situation.separation import least_gaps, separate
-from scenario_gen.types import ALWAYS, Encounter, Vehicle
+from scenario_gen.types import ALWAYS, Vehicle
 
 TIME = 0.1 * np.arange(30)
 
@@ -18,10 +19,8 @@ def queue(*places, present=ALWAYS, width=2.0):
     """Vehicles of 4 m by 2 m, or another width, that drive along x at 5 m/s, so many metres ahead of the first one's place."""
     way = np.column_stack([5.0 * TIME, np.zeros(len(TIME))])
     position = np.stack([way + np.array([x, 0.0]) for x in places])
-    count = len(places)
-    vehicles = tuple(Vehicle(str(n), 4.0, width) for n in range(count))
-    flat = np.zeros((count, 30))
-    return Encounter.sampled(vehicles, 0.1, position, flat, flat + 5.0, "queue", present=present)
+    vehicles = tuple(Vehicle(str(n), 4.0, width) for n in range(len(places)))
+    return encounter_of(position, 0.0, 5.0, vehicles, present=present)
 
 
 def test_least_gap_is_to_nearest():
@@ -41,10 +40,7 @@ def test_nearest_instants_are_needed(meet, begin):
     time = np.arange(101) * 0.1
     along = np.column_stack([8.0 * time, np.zeros(101)])
     position = np.stack([along, [16.0 * meet, 3.5] - along])
-    heading = np.repeat([[0.0], [np.pi]], 101, axis=1)
-    vehicles = (Vehicle("1"), Vehicle("2"))
-    speed = np.full((2, 101), 8.0)
-    passing = Encounter.sampled(vehicles, 0.1, position, heading, speed, "passing")
+    passing = encounter_of(position, np.array([[0.0], [np.pi]]), 8.0)
     windows = interaction_windows(Situation.of(passing))
     assert windows[:, 1] - windows[:, 0] == pytest.approx(5.0)
     assert windows[:, 0] == pytest.approx(begin, abs=0.06)

@@ -3,25 +3,24 @@
 
 """From which distance, side and time on a placement loses what was recorded: each bound from both sides."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from support.motions import encounter_of
 
 from scenario_gen.situation import clean_tracks, find_losses
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Vehicle
 
 
 def pair(beside, ahead=20.0, faster=0.0, until=149, width=2.5):
     """The tracks of two that go east, one at 10 m/s, another so far beside and ahead of it, until a sample."""
     time = 0.1 * np.arange(150)
-    speed = np.array([[10.0], [10.0 + faster]]) * np.ones((2, 150))
+    speed = np.array([[10.0], [10.0 + faster]])
     position = np.zeros((2, 150, 2))
     position[..., 0] = speed * time + np.array([[0.0], [ahead]])
     position[1, :, 1] = beside
     vehicles = (Vehicle("1", width=width), Vehicle("2", width=width))
-    made = Encounter.sampled(vehicles, 0.1, position, np.zeros((2, 150)), speed, "two")
-    return clean_tracks(replace(made, present=np.array([[0, 149], [0, until]])))
+    present = np.array([[0, 149], [0, until]])
+    return clean_tracks(encounter_of(position, 0.0, speed, vehicles, present=present))
 
 
 def lost(template, road):

@@ -5,17 +5,15 @@
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.situation.size import refuse_reversing, refuse_too_large
-from scenario_gen.types import Encounter, Vehicle
 
 
 def standing(count, seconds):
-    flat = np.zeros((count, round(seconds / 0.1) + 1))
-    vehicles = tuple(Vehicle(str(k)) for k in range(count))
-    return Encounter.sampled(vehicles, 0.1, np.zeros((*flat.shape, 2)), flat, flat, "large")
+    return encounter_of(np.zeros((count, round(seconds / 0.1) + 1, 2)), speed=0.0)
 
 
 def test_too_many_vehicle_seconds_are_refused():
@@ -36,10 +34,7 @@ def driving(offset=0.0, jump=0.0, samples=100, period_ns=100_000_000):
     position[..., 0] = np.arange(samples) * period_ns * 1e-8  # at 10 m/s
     position[1, :, 1] = 4.0 + offset
     position[1, samples // 2, 1] += jump
-    flat = np.zeros((2, samples))
-    return Encounter.sampled(
-        (Vehicle("a"), Vehicle("b")), period_ns * 1e-9, position, flat, flat + 10.0, "tracks"
-    )
+    return encounter_of(position, dt=period_ns * 1e-9)
 
 
 @pytest.mark.parametrize("metres", [1e4, 1e7, -1e7])
@@ -50,7 +45,7 @@ def test_impossible_places_are_refused(metres):
         refuse_too_large(driving(offset=metres))
     with pytest.raises(
         RefusedError,
-        match=r"positions of vehicle b are up to .* m apart while its speeds add up to 100 m",
+        match=r"positions of vehicle 2 are up to .* m apart while its speeds add up to 100 m",
     ):
         refuse_too_large(driving(jump=metres))
     refuse_too_large(driving(offset=1900.0))
@@ -73,10 +68,7 @@ def test_driving_backwards_is_refused(frame, metres):
     along = np.interp(np.arange(100) * 0.1, [0.0, 4.0, 7.0, 9.9], [0.0, 20.0, 20.0 - metres, 30.0])
     ahead = np.array([np.cos(frame), np.sin(frame)])
     position = along[None, :, None] * ahead
-    flat = np.zeros((2, 100))
-    both = np.concatenate([position, position + 9.0])
-    vehicles = (Vehicle("a"), Vehicle("b"))
-    made = Encounter.sampled(vehicles, 0.1, both, flat + frame, flat + 5.0, "tracks")
+    made = encounter_of(np.concatenate([position, position + 9.0]), frame, 5.0)
     if metres < 2.0:
         refuse_reversing(made)
         return

@@ -7,25 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.motions import oncoming
 
 from scenario_gen.situation.traffic_side import mirrored, traffic_side
-from scenario_gen.types import Encounter, Vehicle
-
-
-def oncoming(side):
-    """Two vehicles that pass each other, each on its own `side` of the road: 1 for the right."""
-    time = np.arange(101) * 0.1
-    there = np.column_stack([10.0 * time - 50.0, np.full(101, -1.75 * side)])
-    back = np.column_stack([50.0 - 10.0 * time, np.full(101, 1.75 * side)])
-    heading = np.stack([np.zeros(101), np.full(101, np.pi)])
-    return Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")),
-        0.1,
-        np.stack([there, back]),
-        heading,
-        np.full((2, 101), 10.0),
-        "o",
-    )
 
 
 @pytest.mark.parametrize(("side", "name"), [(1.0, "right"), (-1.0, "left")])

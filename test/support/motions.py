@@ -7,7 +7,7 @@ import numpy as np
 
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.types import Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 
@@ -22,6 +22,37 @@ def road_of(drivable, resolution=0.2, origin=(0.0, 0.0)):
 def open_road(size=200.0, resolution=0.25):
     cells = int(size / resolution)
     return road_of(np.ones((cells, cells), dtype=bool), resolution, (-0.5 * size, -0.5 * size))
+
+
+def encounter_of(position, heading=0.0, speed=10.0, vehicles=None, *, dt=0.1, name="two", **more):
+    """An encounter at 10 Hz from positions (N, T, 2); headings and speeds may be one for all, vehicles are called 1, 2, …"""
+    shape = np.shape(position)[:2]
+    heading, speed = (np.broadcast_to(values, shape) for values in (heading, speed))
+    vehicles = vehicles or tuple(Vehicle(str(k + 1)) for k in range(shape[0]))
+    return Encounter.sampled(vehicles, dt, position, heading, speed, name, **more)
+
+
+def encounter_of_drives(*drives, width=1.9):
+    """An encounter from (poses (T, 3), speeds (T,)) of vehicles that are called 0, 1, …"""
+    poses, speed = (np.stack(values) for values in zip(*drives, strict=True))
+    vehicles = tuple(Vehicle(str(k), 4.8, width) for k in range(len(poses)))
+    return encounter_of(poses[..., :2], poses[..., 2], speed, vehicles)
+
+
+def as_scenario(encounter, pace=1.0):
+    """The encounter as a scenario, driven `pace` times as fast."""
+    arrays = (encounter.time, encounter.position, encounter.heading, pace * encounter.speed)
+    rate = np.gradient(pace * encounter.speed, encounter.dt, axis=1)
+    return Scenario(encounter.vehicles, *arrays, rate, present=encounter.present)
+
+
+def oncoming(side, count=101):
+    """Two that pass each other at 10 m/s, each 1.75 m on its own `side` of the middle: 1 for the right."""
+    way = 1.0 * np.arange(count) - 0.5 * (count - 1)
+    position = np.stack(
+        [np.column_stack([k * way, np.full(count, -1.75 * k * side)]) for k in (1.0, -1.0)]
+    )
+    return encounter_of(position, np.array([[0.0], [np.pi]]), name="o")
 
 
 def scenario_of(tracks, time, vehicles=None):

@@ -5,7 +5,8 @@
 
 import numpy as np
 
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Vehicle
+from support.motions import encounter_of
 
 DT = 0.1
 
@@ -33,14 +34,7 @@ def along(speed, start, lane=0.0):
 def lane_encounter(leader, follower, gap=20.0, lane=0.0):
     """Two vehicles on the x axis, the second `gap` metres behind the first."""
     position = np.stack([along(leader, gap), along(follower, 0.0, lane)])
-    return Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")),
-        0.1,
-        position,
-        np.zeros((2, len(leader))),
-        np.stack([leader, follower]),
-        "lane",
-    )
+    return encounter_of(position, speed=np.stack([leader, follower]), name="lane")
 
 
 def crossing(wait_until, speed=8.0, seconds=20.0):
@@ -56,11 +50,8 @@ def crossing(wait_until, speed=8.0, seconds=20.0):
     y = np.concatenate([[0.0], np.cumsum(0.5 * DT * (own[1:] + own[:-1]))])
     y += stop - y[round(begins / DT)]
     position = np.stack([first, np.column_stack([np.full(len(time), 0.0), y])])
-    heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
     speeds = np.stack([np.full(len(time), speed), own])
-    return Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")), 0.1, position, heading, speeds, "crossing"
-    )
+    return encounter_of(position, np.array([[0.0], [0.5 * np.pi]]), speeds, name="crossing")
 
 
 def platoon(count, rows=200, seed=3):
@@ -69,20 +60,12 @@ def platoon(count, rows=200, seed=3):
     for _ in range(1, count):
         speeds.append(answering(speeds[-1], 1.2, 0.9))
     position = np.stack([along(speed, 20.0 * (count - 1 - k)) for k, speed in enumerate(speeds)])
-    vehicles = tuple(Vehicle(str(k + 1)) for k in range(count))
-    return Encounter.sampled(
-        vehicles, 0.1, position, np.zeros((count, rows)), np.stack(speeds), "platoon"
-    )
+    return encounter_of(position, speed=np.stack(speeds), name="platoon")
 
 
 def led_crossing(wait_until=8.0):
     """The crossing, with vehicle 3 20 m ahead of vehicle 1."""
     two = crossing(wait_until)
-    rows = {
-        name: np.concatenate([getattr(two, name), getattr(two, name)[:1]])
-        for name in ("heading", "speed")
-    }
+    heading, speed = (np.concatenate([own, own[:1]]) for own in (two.heading, two.speed))
     position = np.concatenate([two.position, two.position[:1] + np.array([20.0, 0.0])])
-    return Encounter.sampled(
-        (*two.vehicles, Vehicle("3")), two.dt, position, rows["heading"], rows["speed"], "led"
-    )
+    return encounter_of(position, heading, speed, (*two.vehicles, Vehicle("3")), name="led")

@@ -8,42 +8,30 @@ import json
 
 import numpy as np
 import pytest
+from support.motions import encounter_of, scenario_of, straight
 
 from scenario_gen.method.evaluation import coverage_of
 from scenario_gen.method.evaluation.measures import measure
-from scenario_gen.types import Encounter, Facts, OrderChange, PassingOrder, Vehicle
+from scenario_gen.types import Facts, OrderChange, PassingOrder, Vehicle
 from scenario_gen.types.scenario import Scenario
 
 TIME = np.arange(101) * 0.1
+CARS = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
 
 
 def crossing(behind, index=0):
     """Two cars of 4 x 2 m at 10 m/s on crossing axes, the second so many metres behind the first."""
-    along = 10.0 * TIME
-    position = np.stack(
-        [
-            np.stack([along - 30.0, 0 * TIME], axis=-1),
-            np.stack([0 * TIME, along - 30.0 - behind], axis=-1),
-        ]
-    )
-    heading = np.stack([0 * TIME, 0 * TIME + 0.5 * np.pi])
-    speed = np.full((2, 101), 10.0)
-    return Scenario(
-        (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0)),
-        TIME,
-        position,
-        heading,
-        speed,
-        0 * speed,
-        0,
-        index,
-    )
+    tracks = [
+        straight(-30.0, 0.0, 0.0, 10.0, TIME),
+        straight(0.0, -30.0 - behind, 0.5 * np.pi, 10.0, TIME),
+    ]
+    return replace(scenario_of(tracks, TIME, CARS), index=index)
 
 
 @pytest.fixture
 def template():
     one = crossing(20.0)
-    return Encounter.sampled(one.vehicles, 0.1, one.position, one.heading, one.speed, "crossing")
+    return encounter_of(one.position, one.heading, one.speed, CARS)
 
 
 def test_figures_matrix_and_picks(template):
@@ -85,5 +73,5 @@ def test_parallel_drives_close_at_their_fastest():
     speed = np.stack([np.full(101, 10.0), np.where(TIME < 5.0, 14.0, 8.0)])
     x = np.cumsum(0.1 * speed, axis=1) + np.array([[30.0], [0.0]])
     position = np.stack([x, np.full(x.shape, 0.0)], axis=-1)
-    drive = Scenario(crossing(8.0).vehicles, TIME, position, 0.0 * x, speed, 0.0 * x, 0, 0)
+    drive = Scenario(CARS, TIME, position, 0.0 * x, speed, 0.0 * x, 0, 0)
     assert measure(drive, "closing_speed") == pytest.approx(4.0)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import mahalanobis
 import shapely
+from support.motions import as_scenario
 from support.oracle import footprints
 from support.reaction_scenes import answering, lane_encounter, wander
 from support.textbook_motions import labelled
@@ -27,23 +28,11 @@ from scenario_gen.method.evaluation.law import (
 from scenario_gen.method.evaluation.measures import distance_and_ttc
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.situation import find_conflicts
-from scenario_gen.types import Cause, NoteKind, Scenario
+from scenario_gen.types import Cause, NoteKind
 
 POPULATION = PipelineConfig(sampling=SamplingConfig())
 NAMES = FEATURES + JOINT_FEATURES
 KIND = "crossing, rolls"
-
-
-def as_scenario(encounter, pace=1.0):
-    """The encounter driven `pace` times as fast."""
-    return Scenario(
-        encounter.vehicles,
-        encounter.time,
-        encounter.position,
-        encounter.heading,
-        encounter.speed * pace,
-        0.0 * encounter.speed,
-    )
 
 
 @pytest.fixture(scope="module")

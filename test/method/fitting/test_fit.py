@@ -3,11 +3,13 @@
 
 """Templates on roads: ends, lanes, who crosses whom, repair, refusals."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.lengths import LOGS
+from support.motions import encounter_of_drives as encounter_of
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
@@ -18,7 +20,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.situation import find_conflicts, Situation
-from scenario_gen.types import Encounter, Motion, Request, Vehicle
+from scenario_gen.types import Motion, Request, Vehicle
 from scenario_gen.types.fit import Segmentation
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates
@@ -48,12 +50,6 @@ def driven(curve, speed, dt=0.1):
     """(T, 3) poses and (T,) speeds of a vehicle on a curve with the given speeds."""
     s = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * dt)))
     return curve.at(s), speed
-
-
-def encounter_of(*motions):
-    poses, speed = np.stack([m[0] for m in motions]), np.stack([m[1] for m in motions])
-    vehicles = tuple(Vehicle(str(i)) for i in range(len(poses)))
-    return Encounter.sampled(vehicles, 0.1, poses[..., :2], poses[..., 2], speed, "made")
 
 
 def turn(x, y, yaw, before, angle, radius, after=60.0):
@@ -228,14 +224,8 @@ def crossing_pair():
 def test_side_and_arrival_times_are_kept(road_name, yaw):
     encounter = crossing_pair()
     rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    turned = Encounter.sampled(
-        encounter.vehicles,
-        0.1,
-        encounter.position @ rotation.T + 500.0,
-        encounter.heading + yaw,
-        encounter.speed,
-        "turned",
-    )
+    moved = encounter.position @ rotation.T + 500.0
+    turned = replace(encounter, position=moved, heading=encounter.heading + yaw)
     fit = fit_template(turned, every(turned, 5), build_road(road_name, turned))
     first, second = (f.anchors for f in fit.fitted)
     assert [f.manoeuvre for f in fit.fitted] == ["straight", "straight"]

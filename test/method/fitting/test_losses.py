@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 from support.reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
@@ -17,7 +18,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road
 from scenario_gen.situation import clean_tracks, find_losses, LOSABLE
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 
@@ -84,11 +85,8 @@ def along(*offsets, ahead=0.0, kind="car"):
         for k, own in enumerate(offsets)
     ]
     position = np.stack(poses)
-    heading = np.zeros(position.shape[:2])
     vehicles = (Vehicle("1", type=kind), Vehicle("2", type=kind))
-    return clean_tracks(
-        Encounter.sampled(vehicles, 0.1, position, heading, np.full(heading.shape, 10.0), "two")
-    )
+    return clean_tracks(encounter_of(position, vehicles=vehicles))
 
 
 SAME, LEFT, INTO = (0.0,) * 5, (3.5,) * 5, (3.5, 3.5, 1.75, 0.0, 0.0)
@@ -131,11 +129,8 @@ def test_passing_side_is_kept():
         position = np.stack(
             [np.column_stack((x, np.zeros(150))), np.column_stack((past, side * swerve))]
         )
-        speed = np.array([[0.0 if still else 5.0], [20.0]]) * np.ones((2, 150))
-        vehicles = (Vehicle("1"), Vehicle("2"))
-        return clean_tracks(
-            Encounter.sampled(vehicles, 0.1, position, np.zeros((2, 150)), speed, "two")
-        )
+        speed = np.array([[0.0 if still else 5.0], [20.0]])
+        return clean_tracks(encounter_of(position, speed=speed))
 
     for still, kind in ((False, "overtaking"), (True, "stand")):
         template = scene(1.0, still)

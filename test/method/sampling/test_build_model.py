@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -17,7 +18,7 @@ from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
 from scenario_gen.situation import find_waits, Situation
-from scenario_gen.types import Encounter, NoteKind, Vehicle
+from scenario_gen.types import NoteKind
 
 DT = 0.1
 CONFIG = PipelineConfig()
@@ -38,6 +39,12 @@ def track(speed, bend):
     )
 
 
+def apart(drives, offset):
+    """Two drives, the second one moved [m]."""
+    position, heading, speed = (np.stack(values) for values in zip(*drives, strict=True))
+    return encounter_of(position + np.array([[(0.0, 0.0)], [offset]]), heading, speed)
+
+
 def s_bend():
     """Two cars through an S-bend at up to 3.4 m/s² sideways, one behind the other."""
     time = np.arange(201) * DT
@@ -45,14 +52,7 @@ def s_bend():
         track(13.0 + 0.8 * np.sin(0.4 * (time - late)), lambda s: 0.02 * np.sin(s / 22.0))
         for late in (0.0, 1.5)
     ]
-    position = np.stack([one[0] for one in drives]) + np.array([[[0.0, 0.0]], [[-22.0, 0.0]]])
-    return Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")),
-        0.1,
-        position,
-        *(np.stack([d[k] for d in drives]) for k in (1, 2)),
-        name="s",
-    )
+    return apart(drives, (-22.0, 0.0))
 
 
 def rolls_out():
@@ -64,36 +64,18 @@ def rolls_out():
         track(np.convolve(np.pad(v, 3, mode="edge"), np.ones(7) / 7.0, "valid"), lambda s: 0.0 * s)
         for v in (slow, hard)
     ]
-    position = np.stack([one[0] for one in drives]) + np.array([[[0.0, 0.0]], [[0.0, 4.0]]])
-    return Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")),
-        0.1,
-        position,
-        *(np.stack([d[k] for d in drives]) for k in (1, 2)),
-        name="r",
-    )
+    return apart(drives, (0.0, 4.0))
 
 
 def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
     planned = Chain(Situation.of(encounter), segmentation, road, CONFIG).plan()
-    done = build_model(
-        Plan(
-            Situation.of(encounter),
-            segmentation,
-            road,
-            planned.routes,
-            planned.fit.requested,
-            find_waits(encounter),
-        ),
-        NARROW,
-    )
-    return (
-        done.model.draw(np.zeros((1, done.model.size)), NoiseScale()).scenarios(0, [0], "map")[0],
-        done.notes,
-        planned,
-    )
+    asked, waits = planned.fit.requested, find_waits(encounter)
+    plan = Plan(Situation.of(encounter), segmentation, road, planned.routes, asked, waits)
+    done = build_model(plan, NARROW)
+    drawn = done.model.draw(np.zeros((1, done.model.size)), NoiseScale())
+    return drawn.scenarios(0, [0], "map")[0], done.notes, planned
 
 
 @pytest.mark.parametrize("encounter", [s_bend(), rolls_out()], ids=["s-bend", "rolls out"])

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 from support.lengths import LONG
-from support.motions import FREE, open_road, road_of, scenario_of, straight, wander
+from support.motions import encounter_of, FREE, open_road, road_of, scenario_of, straight, wander
 from support.oracle import off_road, overlapping
 from test_validity_presence import random_case
 
 from benchmarks._recheck import Account, Recheck
-from scenario_gen.types import ALWAYS, Encounter, Vehicle
+from scenario_gen.types import ALWAYS, Vehicle
 from scenario_gen.types.scenario import BoundaryStates
 
 TIME = np.arange(101) * 0.1
@@ -30,15 +30,8 @@ def crossing(delay=3.0):
 
 
 def recheck_of(scenario, road=None, changepoints=True):
-    encounter = Encounter.sampled(
-        scenario.vehicles,
-        0.1,
-        scenario.position,
-        scenario.heading,
-        scenario.speed,
-        "t",
-        present=scenario.present,
-    )
+    arrays = (scenario.position, scenario.heading, scenario.speed, scenario.vehicles)
+    encounter = encounter_of(*arrays, present=scenario.present)
     ends = (
         np.column_stack([scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]])
         for k in (0, -1)

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.motions import arc, open_road, scenario_of, straight
+from support.motions import arc, encounter_of, open_road, scenario_of, straight
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.situation import Conflict, find_conflicts, Situation, Wait
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 
 TIME = np.arange(201) * 0.1
@@ -271,20 +271,8 @@ def test_unsuitable_requests_are_errors():
 
 def test_least_gap_follows_the_template():
     time = np.arange(51) * 0.1
-    position = np.stack(
-        [
-            np.column_stack([5.0 * time, np.zeros(51)]),
-            np.column_stack([5.0 * time, np.full(51, 2.5)]),
-        ]
-    )
-    beside = Encounter.sampled(
-        (Vehicle("a"), Vehicle("b")),
-        0.1,
-        position,
-        np.zeros((2, 51)),
-        np.full((2, 51), 5.0),
-        "beside",
-    )
+    position = np.stack([np.column_stack([5.0 * time, np.full(51, y)]) for y in (0.0, 2.5)])
+    beside = encounter_of(position, speed=5.0)
     assert Limits().clearance == 0.0  # nothing is known of a template
     assert Limits().for_template(Situation.of(beside)).clearance == pytest.approx(
         0.3

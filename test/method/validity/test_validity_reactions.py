@@ -7,24 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.motions import as_scenario
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import labelled, REACTIONS
 
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.situation import find_conflicts, Situation
 from scenario_gen.situation.gaps import lane_gaps
-from scenario_gen.types.scenario import Cause, Scenario
-
-
-def as_scenario(encounter):
-    return Scenario(
-        encounter.vehicles,
-        encounter.time,
-        encounter.position,
-        encounter.heading,
-        encounter.speed,
-        np.gradient(encounter.speed, encounter.dt, axis=1),
-    )
+from scenario_gen.types.scenario import Cause
 
 
 def refusals(scenario, template, limits=None):
@@ -120,12 +110,8 @@ def test_least_headway_is_always_kept():
     ), "it does so, too"
 
 
-@pytest.mark.parametrize("kind", REACTIONS)
-def test_textbook_motions_keep_their_own_reactions(kind):
-    template = labelled(kind, 3).encounter
+@pytest.mark.parametrize(
+    "template", [TEMPLATE, LANE, *(labelled(kind, 3).encounter for kind in REACTIONS)]
+)
+def test_templates_keep_their_own_reactions(template):
     assert refusals(as_scenario(template), template) == []
-
-
-def test_templates_keep_their_own_reactions():
-    for template in (TEMPLATE, LANE):
-        assert refusals(as_scenario(template), template) == []

@@ -8,11 +8,12 @@ from itertools import islice
 import numpy as np
 import pytest
 from support.map_builders import FORMATS, write
+from support.motions import encounter_of
 
 from scenario_gen.logs import read_log
 from scenario_gen.roads import find_places, lane_graph, read_network
 from scenario_gen.situation import clean_tracks, find_conflicts
-from scenario_gen.types import Encounter, Motion, Vehicle
+from scenario_gen.types import Vehicle
 
 STEPS, DT = 100, 0.1
 
@@ -25,27 +26,15 @@ def left_turn(median, start):
     oncoming = np.column_stack((start - 0.8 * np.arange(STEPS), np.full(STEPS, median)))[:40]
     oncoming = np.concatenate((oncoming, np.repeat(oncoming[-1:], STEPS - 40, axis=0)))
     speed = np.stack((np.full(STEPS, 4.0), np.where(np.arange(STEPS) < 39, 8.0, 0.0)))
-    heading = np.stack((yaw, np.full(STEPS, np.pi)))
     vehicles = (Vehicle("turns", 4.0, 1.8), Vehicle("oncoming", 4.0, 1.8))
-    return Encounter.sampled(
-        vehicles, DT, np.stack((turning, oncoming)), heading, speed, "left turn"
-    )
+    heading = np.stack((yaw, np.full(STEPS, np.pi)))
+    return encounter_of(np.stack((turning, oncoming)), heading, speed, vehicles)
 
 
 def meet(tracks):
     """Whether two are in conflict."""
-    poses = np.stack([track.poses for track in tracks])
-    return bool(
-        find_conflicts(
-            Motion.sampled(
-                tuple(t.vehicle for t in tracks),
-                DT,
-                poses[..., :2],
-                poses[..., 2],
-                np.zeros(poses.shape[:2]),
-            )
-        )
-    )
+    poses, vehicles = np.stack([track.poses for track in tracks]), [t.vehicle for t in tracks]
+    return bool(find_conflicts(encounter_of(poses[..., :2], poses[..., 2], 0.0, vehicles)))
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

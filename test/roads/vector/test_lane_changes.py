@@ -7,12 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from support.motions import encounter_of
 
 from scenario_gen.roads import lane_graph
 from scenario_gen.roads.vector.hypotheses import hypothesis_at
 from scenario_gen.roads.vector.match import match
 from scenario_gen.situation import clean_tracks, find_conflicts
-from scenario_gen.types import Encounter, Lane, LaneNetwork, Vehicle
+from scenario_gen.types import Lane, LaneNetwork
 
 WIDTH_M, STEPS, DT = 3.5, 100, 0.1
 SAMPLES, GAIN_M2 = 24, 1.5  # of a recorded path; that justifies a change
@@ -33,10 +34,7 @@ def drifting(end_m):
     speed = np.hypot(*np.gradient(np.column_stack((x, y)), axis=0).T) / DT
     ahead = np.column_stack((x + 60.0, np.zeros(STEPS)))
     position = np.stack((np.column_stack((x, y)), ahead))
-    vehicles = (Vehicle("drifts"), Vehicle("ahead"))
-    return Encounter.sampled(
-        vehicles, DT, position, np.stack((heading, 0.0 * x)), np.stack((speed, speed)), "drift"
-    )
+    return encounter_of(position, np.stack((heading, 0.0 * x)), speed)
 
 
 def gain(encounter):

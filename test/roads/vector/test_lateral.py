@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.map_builders import write
+from support.motions import encounter_of
 from support.textbook_motions import driven, line, ramps
 
 from scenario_gen import generate
@@ -37,9 +38,7 @@ def right_hook(gap: float = 2.55) -> Encounter:
     )
     vehicles = (Vehicle("a", 4.6, 1.85), Vehicle("b", 1.8, 0.6, type="bicycle"))
     poses = np.stack([car, bicycle])
-    return Encounter.sampled(
-        vehicles, 0.1, poses[..., :2], poses[..., 2], np.stack([speed, own]), "hook"
-    )
+    return encounter_of(poses[..., :2], poses[..., 2], np.stack([speed, own]), vehicles)
 
 
 def side_distance(encounter: Encounter) -> float:

@@ -6,23 +6,11 @@
 import numpy as np
 import pytest
 from support import map_builders
+from support.motions import oncoming
 
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation.traffic_side import mirrored
-from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
-
-
-def oncoming(side):
-    """Two vehicles that pass each other, each 1.75 m on its own side of the middle: 1 for the right."""
-    time = np.arange(81) * 0.1
-    way = 10.0 * time - 40.0
-    position = np.stack(
-        [np.column_stack([sign * way, np.full(81, -1.75 * side * sign)]) for sign in (1.0, -1.0)]
-    )
-    heading = np.stack([np.zeros(81), np.full(81, np.pi)])
-    return Encounter.sampled(
-        (Vehicle("1"), Vehicle("2")), 0.1, position, heading, np.full((2, 81), 10.0), "o"
-    )
+from scenario_gen.types import Note, NoteKind
 
 
 @pytest.fixture(params=["right", "left"])
@@ -43,7 +31,7 @@ def crossroads(request, tmp_path, monkeypatch):
 def test_template_is_mirrored_on_other_side(crossroads):
     path, side = crossroads
     assert build_road(path).lanes.traffic_side == side
-    for own, encounter in (("right", oncoming(1.0)), ("left", oncoming(-1.0))):
+    for own, encounter in (("right", oncoming(1.0, 81)), ("left", oncoming(-1.0, 81))):
         road, driven = road_and_template(path, encounter)
         assert road.lanes.traffic_side == side
         if own == side:

@@ -6,6 +6,7 @@
 import numpy as np
 import pytest
 from support.map_builders import commonroad, lanelet2, write
+from support.motions import encounter_of
 from test_reported_maps import lane, read, road, section
 
 from scenario_gen.base.errors import RefusedError
@@ -20,7 +21,7 @@ from scenario_gen.roads import (
 )
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.situation import clean_tracks
-from scenario_gen.types import Encounter, NoteKind, Vehicle, VEHICLE_TYPES
+from scenario_gen.types import NoteKind, Vehicle, VEHICLE_TYPES
 
 DRIVE = "bicycle,bus,car,motorcycle,truck,van"
 
@@ -158,8 +159,7 @@ def beside(kind):
     )
     size = VEHICLE_TYPES[kind]
     vehicles = (Vehicle("a", 4.5, 1.8), Vehicle("b", size.length, size.width, kind))
-    states = {"position": position, "heading": np.zeros((2, 80)), "speed": np.full((2, 80), 5.0)}
-    return Encounter.sampled(vehicles, 0.1, name="beside", **states)
+    return encounter_of(position, 0.0, 5.0, vehicles)
 
 
 def street(tmp_path, kind, access=""):
