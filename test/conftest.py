@@ -75,8 +75,8 @@ def browser() -> Iterator[object]:
 
 
 LONGEST = """
-browser generate_action traffic loss live_segmentation recorder over_dds demo_bag node_options
-requests_over_dds maps frames bad_tracks launching signals restart preview off_road reacting search
+browser tutorial generate_action traffic loss live_segmentation recorder over_dds demo_bag node_options
+requests_over_dds maps bad_tracks launching signals restart preview off_road reacting search
 batch suitable_roads recorded_encounters packaging pages same_encounters tasks asked_states cli cli_out library_alone every_cpu
 service_calls mistakes ros_parameters first_start examples plugin paper benchmarks fuzz fit
 """  # of the files of tests, longest first, so that none is left alone with one at the end

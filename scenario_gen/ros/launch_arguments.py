@@ -187,10 +187,10 @@ def _refuse_unknown(file: LaunchFile, names: Iterable[str], words: Sequence[str]
     """
     is_included = file.name not in [Path(word).name for word in words]
     given = {name for name, assigned, _ in (word.partition(":=") for word in words) if assigned}
-    for name in names:
+    for name in (name for name in names if name not in file.declarations):
         near = did_you_mean(name, file.declarations)
         is_own = name in given and not is_included
-        if name not in file.declarations and (near or is_own):
+        if near or is_own:
             raise InputError(
                 f"{name}:= is no argument of {file.name}{near or '; --show-args lists them'}"
             )

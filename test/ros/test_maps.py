@@ -9,7 +9,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from support.bag_examples import skipped, unaccounted
 from support.lengths import LONG
-from support.suite_processes import Client, whole_chain
+from support.suite_processes import Client, Processes, RESOURCES
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.documents import hash_of, head_of
@@ -26,7 +26,15 @@ TINY = "image: tiny.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noc
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory, domain):
     """The whole chain, with sets long enough to be disturbed."""
-    yield from whole_chain(tmp_path_factory.mktemp("maps"), domain, NODES, count=20)
+    folder = tmp_path_factory.mktemp("maps")
+    arguments: dict[str, list[str]] = {node: [] for node in NODES}
+    arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
+    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
+    arguments["gp_sampler"] = ["-p", "count:=20", "-p", "seed:=7"]
+    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
+    made = Processes(folder, domain, arguments)
+    yield made
+    made.kill()
 
 
 def _maps(client: Client) -> list[str]:

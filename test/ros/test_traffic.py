@@ -6,7 +6,6 @@
 from dataclasses import replace
 import json
 import math
-from pathlib import Path
 import sys
 
 import numpy as np
@@ -369,12 +368,3 @@ def test_planner_node_verdicts_equal_in_process(bag, tmp_path, monkeypatch):
             app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", planner, *more]
         )
         assert said in str(refused.exception), refused.output
-
-
-def test_planner_may_call_step_itself(bag, tmp_path):
-    """Both the command and the planner's call of traffic/step wait for one reply."""
-    example = Path(__file__).parents[2] / "examples" / "ego_consumer.py"
-    planner = f"{sys.executable} {example} --ros-args -p lock_step:=true"
-    words = ["drive", str(bag), "--count", "2", "--ros", "--planner", planner, "--ego", "1"]
-    ended = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out")])
-    assert (tmp_path / "out" / "drives.json").is_file(), ended.output

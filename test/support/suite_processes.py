@@ -4,7 +4,7 @@
 """Real nodes in real processes, and a client to talk to them."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 import os
 from pathlib import Path
 import signal
@@ -211,17 +211,3 @@ def memory(pid: int, key: str) -> int:
     path = Path("/proc") / str(pid) / "status"
     lines = path.read_text().splitlines() if path.exists() else ()
     return next((int(line.split()[1]) for line in lines if line.startswith(key)), 0)
-
-
-def whole_chain(
-    folder: Path, domain: int, nodes: Iterable[str], *, count: int, apart: Iterable[str] = ()
-) -> Iterator[Processes]:
-    """Run nodes on one log, with sets of `count` scenarios and a bag in `folder`; a test that has not ended them has failed."""
-    arguments: dict[str, list[str]] = {node: [] for node in nodes}
-    arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
-    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
-    arguments["gp_sampler"] = ["-p", f"count:={count}", "-p", "seed:=7"]
-    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
-    made = Processes(folder, domain, arguments, apart=apart)
-    yield made
-    made.kill()
