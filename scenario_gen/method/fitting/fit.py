@@ -391,18 +391,16 @@ def _place(situation: Situation, road: Road, config: FittingConfig) -> Placement
     if config.placement == "lanes" or road.map_lanes is not None:
         return place_on_lanes(tracks, road, config)
 
-    share = float(np.mean([share_with_room(road, track) for track in tracks]))
-    home_refusal = ""
+    placed, home_refusal = tracks, ""
     try:
         at_home = place_in_own_frame(situation, road, config)
+        placed = at_home.tracks
     except RefusedError as error:
         home_refusal = str(error)
-    else:
-        enough = _MIN_ROOM_AT_HOME_SHARE
-        if road.lanes is None:
-            enough = _MIN_ROOM_WITHOUT_LANES_SHARE
-        if share >= enough:
-            return at_home
+    share = float(np.mean([share_with_room(road, track) for track in placed]))
+    enough = _MIN_ROOM_WITHOUT_LANES_SHARE if road.lanes is None else _MIN_ROOM_AT_HOME_SHARE
+    if not home_refusal and share >= enough:
+        return at_home
     try:
         if road.lanes is None:
             return place_by_search(tracks, road, config)

@@ -32,6 +32,7 @@ from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph, LanePath
 from scenario_gen.roads.vector.match import Match, match
 from scenario_gen.situation import (
     drivers_of,
+    pair_crossings,
     to_frenet,
     Track,
 )
@@ -233,10 +234,23 @@ def windows_on_lanes(network: LaneNetwork, tracks: tuple[Track, ...]) -> list[Fl
 def _refusal(search: _Search) -> str:
     """Return the message for a recording without a place."""
     network = search.graph.network
-    _, _, reason = min(search.failures, default=(True, 0.0, "no lanes have its directions"))
+    no_match = (True, 0.0, "no lanes have its directions")
+    has_no_lanes, _, reason = min(search.failures, default=no_match)
+    if has_no_lanes:
+        reason = _missing_crossing(search) or reason
     kind = "road" if network.drawn else "map"
     notes = "".join(f"; {note}" for note in network.notes if network.drawn)
     return f"the recording does not fit {kind} {network.name}: {reason}{notes}"
+
+
+def _missing_crossing(search: _Search) -> str:
+    """Return whose paths cross, if no lanes do."""
+    pair = next(pair_crossings(search.drivers), None)
+    if pair is None or len(search.graph.crossings[0]):
+        return ""
+    second, first, _ = pair
+    names = [search.drivers[n].vehicle.id for n in (first, second)]
+    return f"the paths of vehicles {' and '.join(names)} cross, and no lanes do"
 
 
 @lru_cache(maxsize=4)  # a map's part is chosen by it, and the recording fitted

@@ -240,6 +240,23 @@ def test_side_and_arrival_times_are_kept(road_name, yaw):
     assert fit.requested.start[:, 3].tolist() == pytest.approx([9.0, 6.0])
 
 
+def test_crossing_needs_lanes_that_cross():
+    encounter = crossing_pair()
+    with pytest.raises(RefusedError, match="the paths of vehicles 0 and 1 cross, and no lanes do"):
+        fit_template(encounter, every(encounter), build_road("merge"))
+
+
+def test_separated_vehicles_stay_at_home():
+    """The corridor is drawn around the paths as they were separated, with little room."""
+    speed = np.full(101, 8.0)
+    encounter = encounter_of(
+        driven(straight(-40.0, 0.0, 0.0), speed), driven(straight(0.0, -42.0, np.pi / 2.0), speed)
+    )
+    road = build_road("corridor", encounter, RoadConfig(corridor_margin=0.1))
+    fit = fit_template(encounter, every(encounter), road, FittingConfig(allow="lost_conflict"))
+    assert "in the recording's own frame" in str(fit.notes[0])
+
+
 def test_turns_take_arms_on_their_side():
     for angle, name in ((np.pi / 2.0, "left"), (-np.pi / 2.0, "right")):
         speeds = np.full(110, 7.0)
