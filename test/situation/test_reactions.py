@@ -13,7 +13,7 @@ from support.motions import encounter_of
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
-from scenario_gen.situation import Conflict, interaction_windows, kind_of, Situation
+from scenario_gen.situation import Conflict, departure, interaction_windows, kind_of, Situation
 from scenario_gen.situation.reactions import without_circles
 from scenario_gen.situation.separation import least_gaps
 from scenario_gen.situation.yielding import _enters_from_beside, Recording
@@ -200,3 +200,11 @@ def test_angled_entry_comes_from_beside(frame, left, turned, beside):
     recording = Recording(encounter, Situation.of(encounter).tracks, (), ())
     conflict = Conflict(0, 1, False, 3.0, 4.0, 5.0, 6.0)
     assert _enters_from_beside(recording, conflict) == beside
+
+
+@pytest.mark.parametrize("begin", [3.0, 3.03, 3.07])
+def test_departure_is_between_samples(begin):
+    """It stands until then, and is as fast as 0.5 m/s a quarter of a second later."""
+    speed = np.maximum(2.0 * (0.1 * np.arange(101) - begin), 0.0)
+    motion = encounter_of(np.zeros((2, 101, 2)), speed=speed)
+    assert departure(motion, 0, 6.0) == pytest.approx(begin + 0.25)

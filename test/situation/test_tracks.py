@@ -13,8 +13,8 @@ import pytest
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.situation import abreast_in_lane, Equation, path_crossing, solve_placement
-from scenario_gen.situation.frenet import _extended, to_frenet
-from scenario_gen.situation.separation import separate, smallest_gaps
+from scenario_gen.situation.frenet import _extended, main_line, to_frenet
+from scenario_gen.situation.separation import separate, separate_recorded, smallest_gaps
 from scenario_gen.situation.tracks import clean_tracks, is_same_turn, manoeuvre_of
 from scenario_gen.types import Encounter, Vehicle
 
@@ -113,6 +113,9 @@ def test_gaps_survive_straightening():
     low, high = frenet.span(clean_tracks(encounter))
     assert low == pytest.approx(frenet.station[1, 0] - 2.4)  # half a car
     assert high == pytest.approx(frenet.station[0, -1] + 2.4)
+    station = main_line(frenet, clean_tracks(encounter)).station
+    assert station[[0, -1]] == pytest.approx([low, high])
+    assert np.ptp(np.diff(station)) < 1e-6
 
 
 def test_lanes_are_told_from_offsets():
@@ -173,6 +176,16 @@ def test_overlapping_vehicles_are_pulled_apart():
     assert len(separation.notes) == 2 and "0.45 m" in str(separation.notes[0])
     with pytest.raises(RefusedError, match="vehicles 1 and 0"):
         separate(tracks, 0.5, 0.3)
+
+
+def test_smoothing_of_a_metre_is_reported():
+    tracks = clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(0.0, 9.0, 0.0, 8.0)))
+    smoothed = [
+        replace(track, deviation=metres)
+        for track, metres in zip(tracks, (1.01, 0.99), strict=True)
+    ]
+    (note,) = separate_recorded(smoothed).notes
+    assert dict(note.values) == {"vehicle": "0", "distance": 1.01}
 
 
 def test_tight_bend_is_eased():

@@ -13,6 +13,7 @@ import pytest
 from support.evaluation_worlds import CARS, crossing, replayed, samples
 
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig, replay
+from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.types import ALWAYS, NoteKind
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit, FittedVehicle
@@ -174,6 +175,14 @@ def test_long_template_is_resampled():
     )
     assert "60 steps" in str(found.row("recording").notes[0])
     assert found.value("x", "e_position") < 1e-6
+
+
+@pytest.mark.parametrize("count", [999, 1000, 1001, 5000])
+def test_measured_runs_span_the_set(count):
+    found = np.array(measured(range(count)))
+    assert (found[0], found[-1], len(found)) == (0, count - 1, min(count, 1000))
+    starts = found[::50]
+    assert count <= 1000 or np.ptp(np.diff(starts)) <= 1
 
 
 def test_replay_keeps_dwells_and_chords():

@@ -48,3 +48,13 @@ def test_standing_vehicle_is_met_once():
     assert poses_time_shift(a, b, vehicles) == pytest.approx(3.0 - 0.3 - 1.0, abs=0.11)
     assert poses_time_shift(a[:20], b, vehicles) == MAX_SHIFT_S
     assert poses_time_shift(a, b[:0], vehicles) == MAX_SHIFT_S
+
+
+@pytest.mark.parametrize(("beyond", "met"), [(-0.01, True), (0.01, False)])
+def test_corners_meet_at_their_diagonals(beyond, met):
+    """Two that stand for an instant each, a second apart, on a line through a corner of each."""
+    vehicles = (Vehicle("a", 4.0, 2.0), Vehicle("b", 6.0, 3.0))
+    apart = np.hypot(2.0, 1.0) + np.hypot(3.0, 1.5) + beyond
+    a = np.array([[0.0, 0.0, 0.0, -np.arctan2(1.0, 2.0)]])
+    b = np.array([[1.0, apart, 0.0, np.pi - np.arctan2(1.5, 3.0)]])
+    assert poses_time_shift(a, b, vehicles) == (1.0 if met else MAX_SHIFT_S)

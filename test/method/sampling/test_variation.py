@@ -29,8 +29,10 @@ from scenario_gen.method.sampling.variation import (
 )
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.situation import Situation
 from scenario_gen.types import Vehicle
 from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import BoundaryStates
 
 GRID = 0.1 * np.arange(201)
 NOMINAL = clock_from_rate(GRID, np.ones(201))
@@ -136,6 +138,22 @@ def test_requested_and_relaxed_states_hold():
         assert abs(scenario.speed[0, 0] - speed) < 0.1
     ends = np.array([scenario.position[0, -1] for scenario in made.scenarios])
     assert np.ptp(ends[:, 0]) > 1.0  # its end is free
+
+
+@pytest.mark.parametrize("sigma", [0.5, 2.0])
+def test_free_ends_reach_slowest_clock(sigma):
+    """What a vehicle at 5 m/s drives in twice its greatest delay at 0.75 times its pace."""
+    zero = dict.fromkeys(("wait_sigma", "gap_sigma", "pace_sigma", "leave_out"), 0.0)
+    zero |= dict.fromkeys(("place_sigma", "end_speed_sigma", "duration_tolerance"), 0.0)
+    config = SamplingConfig(arrival_sigma=sigma, **zero)
+    plan = scene_plan()
+    encounter = replace(plan.encounter, speed=np.full(plan.encounter.speed.shape, 5.0))
+    states = np.full((3, 4), 5.0)
+    asked = relaxed_states(
+        BoundaryStates(states, states), Situation.of(encounter), config, Request()
+    )
+    expected = config.scaled.freedom * 2.0 * config.scaled.arrival_sigma / 0.75 * 5.0
+    np.testing.assert_allclose(asked.relaxed[:, :, 0], expected, atol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@
 from dataclasses import replace
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -58,6 +59,19 @@ def test_light_is_known_until_a_crossing(result):
             scenario.with_facts(Facts(lights=placed.lights))
         ).facts.lights
         assert shown.schedule.at(crosses) == expected
+
+
+def test_lights_wait_for_mean_departure(result):
+    """Two vehicles are 1 s and 0.5 s late, another one so late that it does not count."""
+    scenario, cycle = result[0], SignalSchedule.cycle((7.0, 5.0), ("green", "red"))
+    late = tuple(SimpleNamespace(lateness=lambda *_, s=s: s) for s in (1.0, 0.5, 9.0))
+    (light, *_) = scenario.facts.lights
+    placed = PlacedLights((replace(light, schedule=cycle),), 0.0, late)
+    (shown,) = placed.with_departures(
+        scenario.with_facts(Facts(lights=placed.lights))
+    ).facts.lights
+    for time in np.arange(0.025, 24.0, 0.05):
+        assert shown.schedule.at(time + 0.75) == cycle.at(time)
 
 
 def test_vehicle_running_red_is_refused(result):

@@ -9,6 +9,8 @@ from support.map_builders import commonroad, opendrive, write
 from support.reaction_scenes import lane_encounter
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import generate
 from scenario_gen.roads import build_road
 from scenario_gen.types import NoteKind
@@ -75,12 +77,9 @@ def test_narrow_or_too_few_lanes_named(tmp_path) -> None:
     narrow = write(tmp_path, ".xodr", opendrive().replace('a="3.5"', 'a="1.2"'))
     with pytest.raises(RefusedError, match=r"lane .* is 1\.2 m wide at .* too narrow for vehicle"):
         generate(lane_encounter(speed, speed), narrow, count=1)
-    passing = lane_encounter(speed, speed + 4.0, gap=10.0, lane=3.5)
-    with pytest.raises(
-        RefusedError, match=r"passes 1 on its left in the recording, not on .* Shortened"
-    ):
-        generate(passing, write(tmp_path, ".xodr"), count=1)
-    result = generate(
-        lane_encounter(speed, speed, gap=10.0, lane=3.5), write(tmp_path, ".xodr"), count=1
-    )
-    assert {loss.kind for loss in result.fit.losses} >= {"lanes"}
+    road = build_road(str(write(tmp_path, ".xodr")))
+    passing, beside = (lane_encounter(speed, speed + v, gap=10.0, lane=3.5) for v in (4.0, 0.0))
+    with pytest.raises(RefusedError, match="passes 1 on its left in the recording, not on"):
+        fit_template(passing, segment(passing), road)
+    losses = fit_template(beside, segment(beside), road).losses
+    assert {loss.kind for loss in losses} >= {"lanes"}
