@@ -13,6 +13,8 @@ TrackedObjects of Autoware's perception (autoware_perception_msgs):
 | position, heading | objects[].kinematics.pose_with_covariance.pose: the shape's centre | m |
 | speed | objects[].kinematics.twist_with_covariance.twist.linear, in its frame | m/s |
 | length, width | objects[].shape.dimensions.x, y | m |
+
+Encounters are messages of the topic `tracks` (type TRACKS).
 """
 
 from collections import Counter
@@ -25,12 +27,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msg_conventions import layouts, topics, tracks, trajectory
+from msg_conventions import layouts, topics, trajectory
 from msg_conventions.cdr import decode
 from msg_conventions.poses import FRAMES_TYPE, ODOMETRY_TYPE, yaw
+from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Encounter
+
+__all__ = ["Samples", "decode_samples", "decode_tracks", "encode_tracks"]
 
 FIX, TWIST, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, trajectory.TYPE
 ODOMETRY, TRANSFORMS = ODOMETRY_TYPE, FRAMES_TYPE
@@ -175,15 +179,6 @@ def _joined(
         size=np.median([body.size for body in bodies], axis=0),
         kind=Counter(body.kind for body in bodies).most_common(1)[0][0],
     )
-
-
-def decode_tracks(data: bytes, place: str) -> Encounter:
-    """Return the encounter in a message of type TRACKS.
-
-    Raises:
-        InputError: it is damaged, or not an encounter; names `place`.
-    """
-    return tracks.decode_tracks(data, place)
 
 
 def _object(entry: Any, pose: Sequence[float]) -> _State:

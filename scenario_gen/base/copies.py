@@ -5,17 +5,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-import tempfile
 
 from scenario_gen.base.errors import ScenarioGenError
 
 _copies: dict[str, str] = {}  # {path of a copy: name of its input}; a path is never reused
-
-
-def temp_folder() -> Path:
-    """Return the folder for temporary copies: TMPDIR."""
-    return Path(tempfile.gettempdir())
 
 
 @contextmanager

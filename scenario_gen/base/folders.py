@@ -192,8 +192,11 @@ def _emptied(folder: Path) -> bool:
 
 
 @contextmanager
-def scratch(parent: Path) -> Iterator[Path]:
-    """Yield an empty folder in `parent` that only this user may enter; remove it at the end."""
+def scratch(parent: Path | None = None) -> Iterator[Path]:
+    """Yield an empty folder that only this user may enter; remove it at the end.
+
+    It is in `parent`, or else in the folder for temporary files (TMPDIR).
+    """
     with ExitStack() as stack:
         with signals_deferred():
             folder = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=parent))

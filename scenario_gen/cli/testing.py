@@ -6,7 +6,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, TYPE_CHECKING
 
 import typer
@@ -309,6 +308,7 @@ def drawn_from(options: Search) -> "Replanned":
             and none was chosen.
         RefusedError: the encounter does not fit the road.
     """
+    from scenario_gen.base.folders import scratch
     from scenario_gen.cli.folder import FolderRequest, generate_folder
     from scenario_gen.output.results import BAG
     from scenario_gen.output.review.replan import replanned
@@ -324,14 +324,14 @@ def drawn_from(options: Search) -> "Replanned":
         seed=options.seed,
         encounters=names,
     )
-    with TemporaryDirectory() as place:
-        cases, _ = generate_folder(Path(place) / "one", request)
+    with scratch() as place:
+        cases, _ = generate_folder(place / "one", request)
         if len(cases) > 1:
             known = " or ".join(case.encounter.name for case in cases)
             raise InputError(
                 f"{options.source}: {len(cases)} encounters; choose one: --encounter {known}"
             )
-        return replanned(Path(place) / "one" / BAG, options.namespace)
+        return replanned(place / "one" / BAG, options.namespace)
 
 
 @commands.command()

@@ -6,10 +6,10 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import gettempdir
 from threading import Timer
 from typing import Any
 
-from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError
 from scenario_gen.corpus.messages import database, pattern_of, quoted, tables
 
@@ -48,7 +48,7 @@ def matching(
     task = f"{source}: condition {condition!r}"
     names = [str(path.absolute()) for path in paths]
     files = quoted([*names, *map(pattern_of, names)])
-    with database(temp_folder(), 400, task, remedy) as base, _time_limit(base, seconds, task):
+    with database(Path(gettempdir()), 400, task, remedy) as base, _time_limit(base, seconds, task):
         base.execute(
             f"CREATE VIEW scenarios AS SELECT {columns} FROM {tables(paths, ', filename = true')}"
         )

@@ -8,7 +8,7 @@ formats are read whole.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from itertools import combinations
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
+from scenario_gen.bags.vehicles import decode_tracks, encode_tracks
 from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, UnforeseenError
 from scenario_gen.corpus.config import CorpusConfig
@@ -224,7 +224,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "ttc": measures.min_ttc,
         "pet": measures.pet,
         "speed": float((encounter.speed * encounter.is_present).max()),
-        "tracks": tracks_bytes(encounter),
+        "tracks": encode_tracks(encounter),
     }
 
 
@@ -299,6 +299,6 @@ def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -
             )
     origin = None if row["lat"] is None or row["lon"] is None else (row["lat"], row["lon"])
     try:
-        return tracks_of(row["tracks"], row["name"], origin)
+        return replace(decode_tracks(row["tracks"], row["name"]), origin=origin)
     except InputError as error:
         raise InputError(f"{table}: {error}") from error

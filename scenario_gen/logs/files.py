@@ -13,7 +13,7 @@ import zipfile
 import zlib
 
 from scenario_gen.bags.storage.files import files_of, METADATA
-from scenario_gen.base.copies import naming_inputs, renamed, temp_folder
+from scenario_gen.base.copies import naming_inputs, renamed
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, reading
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.removed import refuse_removed
@@ -44,7 +44,7 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     if not packed:
         yield list(paths)
         return
-    with scratch(temp_folder()) as folder:
+    with scratch() as folder:
         targets = {k: folder / str(k) / without_packing(path).name for k, path in packed.items()}
         names = {str(targets[k]): str(path) for k, path in packed.items()}
         with naming_inputs(names):

@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, overload, TYPE_CHECKING
 
-from scenario_gen.base.copies import naming_inputs, temp_folder
+from scenario_gen.base.copies import naming_inputs
 from scenario_gen.base.errors import InputError, reading
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.parameters import updated
@@ -180,7 +180,7 @@ def _read(path: "Path | str | Sequence[Path | str] | DataFrame", config: LogConf
         InputError: as `read_log`.
     """
     if not isinstance(path, (str, Path, Sequence)):
-        with scratch(temp_folder()) as folder:
+        with scratch() as folder:
             file = folder / _DATAFRAME_FILE
             with naming_inputs({str(file): "the DataFrame"}):
                 path.to_csv(file, index=False)

@@ -13,7 +13,6 @@ from typing import Any
 
 from scenario_gen.bags.recordings.write import add_results, write_recording
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, replaced_folder, scratch, sha256_of, write_text
 from scenario_gen.base.provenance import log_texts, what_makes_it_again
@@ -72,7 +71,7 @@ def save(result: GenerationResult, target: Path | str) -> Path:
             file.write_bytes(TABLES[suffix](result.to_dataframe()))
         return target
     if suffix == "mcap":
-        with scratch(temp_folder()) as place, _new_file(target) as file:
+        with scratch() as place, _new_file(target) as file:
             (messages,) = write_recording(place / "bag", result).glob("*.mcap")
             shutil.copyfile(messages, file)
         return target

@@ -12,7 +12,6 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.types.coverage import Coverage
@@ -274,7 +273,7 @@ class GenerationResult:
         """
         import scenario_gen
 
-        with scratch(temp_folder()) as place:
+        with scratch() as place:
             scenario_gen.export_bag(self.save(place / "bag"), Path(folder), target)
         return Path(folder)
 

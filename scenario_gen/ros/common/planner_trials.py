@@ -72,9 +72,7 @@ class TrialTraffic(Traffic):
             start = monotonic()
             await self._wait_for_command(self._states[-1], self.config.patience)
             if self._sent_count > 1:  # each copy may get a reply, of which the last one counts
-                deadline = monotonic() + LAST_REPLY_S
-                while monotonic() < deadline:
-                    await self._next_command(deadline)
+                await self.waits.until(lambda: False, monotonic() + LAST_REPLY_S)
             while loop is not None and not self._verdict:
                 await self._step_once(loop)
                 self._check_time(self._trials[number], start)

@@ -12,6 +12,7 @@ import numpy as np
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
+from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.shortening import cut, fitting_part
@@ -40,9 +41,16 @@ def request_part(
         config: what is kept before and after the interaction.
 
     Raises:
-        RefusedError: no part fits.
+        RefusedError: no part fits, or none is wanted.
     """
-    part, _, note = fitting_part(attempt, encounter, refusal, config)
+    if not config.shorten:
+        raise refusal
+
+    def unless_cancelled(part: Encounter) -> object:
+        stop_if_cancelled()
+        return attempt(part)
+
+    part, _, note = fitting_part(unless_cancelled, encounter, refusal, config)
     if part.start_ns == encounter.start_ns:
         part = cut(part, np.maximum(part.time[part.present], part.dt))
     node.outputs.send(TOPIC, encode_tracks(part))

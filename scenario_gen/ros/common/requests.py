@@ -18,7 +18,6 @@ from typing import Any
 
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level, Subject
@@ -33,14 +32,13 @@ from scenario_gen.method.segmentation import SegmentationConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.ros.common.ros_parameters import values_of_call
 from scenario_gen.ros.common.services import offer_trigger, REQUESTS
-from scenario_gen.ros.common.timers import create_steady_timer
+from scenario_gen.ros.common.waits import Waits
 from scenario_gen.types import (
     GenerationResult,
     Request,
 )
 
 MAX_NAMED_COUNT = 20  # waiting requests in a message
-POLL_S = 0.1  # between two checks whether waiting requests can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 Answer = tuple[GenerationResult, RequestSummary]
 """The result of a request, whose scenarios have been published."""
@@ -146,8 +144,7 @@ class OpenRequests:
         self._open: dict[str, OpenRequest] = {}
         self._numbers = count(1)
         self._lock = threading.Lock()
-        self._waiters: list[tuple[Future, Callable[[], bool]]] = []
-        self._timer = create_steady_timer(node, POLL_S, self.check_waiting)
+        self.waits = Waits(node)  # checked when an input has arrived
         for kind, name, answer in (
             (SetParametersAtomically, "~/generate", self._generate),
             (Trigger, "~/wait_until_ready", self._wait_until_ready),
@@ -215,7 +212,7 @@ class OpenRequests:
         """Cancel a request; return False if it has ended."""
         if request.waiting_for:
             request.cancelled = True
-            self.check_waiting()
+            self.waits.check()
             return True
         return bool(self._node.cancel(request.job))
 
@@ -320,13 +317,12 @@ class OpenRequests:
 
         Then append the request to the queue.
         """
-        deadline = monotonic() + wait
 
-        def is_over() -> bool:
+        def is_ready() -> bool:
             request.waiting_for = self.missing()
-            return request.cancelled or not request.waiting_for or monotonic() >= deadline
+            return request.cancelled or not request.waiting_for
 
-        await self._until(is_over)
+        await self.waits.until(is_ready, monotonic() + wait)
         if request.cancelled:
             return Code.CANCELLED, "cancelled"
         if not self._node.active:
@@ -337,20 +333,6 @@ class OpenRequests:
         with self._lock:
             self._open[request.name] = self._open.pop(request.name)
         return Code.OK, ""
-
-    async def _until(self, is_over: Callable[[], bool]) -> None:
-        """Wait until `is_over` returns True.
-
-        It is called ten times a second, and for every input.
-        """
-        if is_over():
-            return
-        arrived = Future()
-        self._waiters.append((arrived, is_over))
-        self._timer.reset()
-        await arrived
-        # The next waiter's turn comes when this request is in the queue.
-        self._node.executor.create_task(self.check_waiting)
 
     def missing(self) -> list[str]:
         """Return the topics that a request waits for.
@@ -371,22 +353,11 @@ class OpenRequests:
             return 0
         return queue.index(request.name)
 
-    def check_waiting(self) -> None:
-        """Resume the first request whose wait is over; called when an input has arrived."""
-        for waiter in list(self._waiters):
-            arrived, is_over = waiter
-            if is_over():
-                self._waiters.remove(waiter)
-                arrived.set_result(None)
-                break
-        if not self._waiters:
-            self._timer.cancel()
-
     async def _wait_until_ready(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
         """Answer once a request with the node's parameters can be served."""
-        await self._until(lambda: not self.missing())
+        await self.waits.until(lambda: not self.missing())
         response.success = True
         response.message = "ready"
         return response

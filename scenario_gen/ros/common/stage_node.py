@@ -367,3 +367,19 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self.diagnostics.resolve(topic)
         except Exception as error:
             self.diagnostics.failed(topic, error)
+
+
+class TemplateNode(StageNode):
+    """A stage node whose inputs belong to one template; `pair_map` says whether the map does."""
+
+    def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
+        super().__init__(name, config, namespace)
+        if self.config.pair_map:
+            self.inputs = Inputs(self.INPUTS)
+        else:  # any server's map, without lanes, which may be those of another map
+            self.INPUTS = tuple(topic for topic in self.INPUTS if topic != LANES)
+            self.inputs = Inputs({*self.INPUTS} - {"map"}, unpaired=("map",))
+
+    def stopped(self) -> None:
+        """Forget the inputs, which are latched and arrive again."""
+        self.inputs.clear()

@@ -17,7 +17,6 @@ from pathlib import Path
 import shutil
 import signal
 import sys
-import tempfile
 import time
 from typing import Any
 
@@ -29,6 +28,7 @@ import yaml
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, Subject
 from msg_conventions.scenario_info import decode_info, RequestSummary
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.folders import scratch
 from scenario_gen.base.parameters import flatten, values_of
 from scenario_gen.base.ros_domain import own_domain
 from scenario_gen.base.signals import cleaned_up, ctrl_c_blocked, end_with_parent
@@ -180,25 +180,21 @@ def run_suite(
     """
     if bag.exists():
         raise InputError(f"{bag} exists already; name another folder for the bag, or remove it")
-    scratch = Path(tempfile.mkdtemp(prefix="scenario_gen_suite_"))
-    try:
-        with cleaned_up(partial(shutil.rmtree, scratch, ignore_errors=True)), own_domain():
-            file = scratch / "parameters.yaml"
-            body = parameters(jobs, config, count, seed, scratch / bag.name)
-            file.write_text(yaml.safe_dump(body), encoding="utf-8")
-            ros_args = ["--ros-args", "--params-file", str(file)]
-            spaces = [word for job in jobs for word in ("--namespace", job.namespace)]
-            commands = (
-                ["recorder", *ros_args],
-                ["suite", "--nodes", ",".join(GENERATORS), *spaces, *ros_args],
-            )
-            state = Progress(jobs, progress)
-            with _watched(state) as spin_once, _processes(commands, scratch) as processes:
-                _follow(processes, state, spin_once, scratch, timeout)
+    with scratch() as place, own_domain():
+        file = place / "parameters.yaml"
+        body = parameters(jobs, config, count, seed, place / bag.name)
+        file.write_text(yaml.safe_dump(body), encoding="utf-8")
+        ros_args = ["--ros-args", "--params-file", str(file)]
+        spaces = [word for job in jobs for word in ("--namespace", job.namespace)]
+        commands = (
+            ["recorder", *ros_args],
+            ["suite", "--nodes", ",".join(GENERATORS), *spaces, *ros_args],
+        )
+        state = Progress(jobs, progress)
+        with _watched(state) as spin_once, _processes(commands, place) as processes:
+            _follow(processes, state, spin_once, place, timeout)
         bag.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(scratch / bag.name, bag)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        shutil.move(place / bag.name, bag)
     return bag
 
 
@@ -223,13 +219,11 @@ def _watched(state: Progress) -> Iterator[Callable[[], None]]:
 
 
 @contextmanager
-def _processes(
-    commands: Sequence[list[str]], scratch: Path
-) -> Iterator[Mapping[str, BaseProcess]]:
+def _processes(commands: Sequence[list[str]], place: Path) -> Iterator[Mapping[str, BaseProcess]]:
     """Run executables as child processes, which end with the block, or by Ctrl-C, in order."""
     context = multiprocessing.get_context("spawn")
     processes = {
-        words[0]: context.Process(target=_become, args=(words, str(scratch / f"{words[0]}.log")))
+        words[0]: context.Process(target=_become, args=(words, str(place / f"{words[0]}.log")))
         for words in commands
     }
     with cleaned_up(partial(_end, list(processes.values()))):
@@ -273,7 +267,7 @@ def _follow(
     processes: Mapping[str, BaseProcess],
     state: Progress,
     spin_once: Callable[[], None],
-    scratch: Path,
+    place: Path,
     timeout: float,
 ) -> None:
     """Wait until every job is done and recorded.
@@ -286,17 +280,17 @@ def _follow(
         spin_once()
         for name, process in processes.items():
             if not process.is_alive():
-                output = _last_output(scratch, name)
+                output = _last_output(place, name)
                 raise RefusedError(f"{name} ended with code {process.exitcode}{output}")
         if time.monotonic() > deadline:
             node = state.pending_node()
-            output = _last_output(scratch, "recorder" if node == "/recorder" else "suite")
+            output = _last_output(place, "recorder" if node == "/recorder" else "suite")
             raise RefusedError(f"{node} did not answer within {timeout:.0f} s{output}")
 
 
-def _last_output(scratch: Path, name: str) -> str:
+def _last_output(place: Path, name: str) -> str:
     """Return the last lines that a process wrote, as the end of a message."""
-    path = scratch / f"{name}.log"
+    path = place / f"{name}.log"
     if not path.is_file():
         return ""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()[-5:]

@@ -38,7 +38,7 @@ from scenario_gen.ros.common.requests import (
     OpenRequest,
     OpenRequests,
 )
-from scenario_gen.ros.common.stage_node import Inputs, StageNode
+from scenario_gen.ros.common.stage_node import TemplateNode
 from scenario_gen.ros.common.topics import acknowledgement_warning, other_publishers
 from scenario_gen.situation import Situation
 from scenario_gen.types import (
@@ -54,7 +54,7 @@ from scenario_gen.types import (
 GOAL = "ego/goal"
 
 
-class GpSampler(StageNode):
+class GpSampler(TemplateNode):
     """Samples valid scenarios around the planned routes."""
 
     INPUTS = ("map", LANES, "tracks", "changepoints", PLAN)
@@ -72,19 +72,10 @@ class GpSampler(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = ("tracks", "changepoints", PLAN)
-        if self.config.pair_map:
-            self.inputs = Inputs((*paired, "map", LANES))
-        else:
-            self.inputs = Inputs(paired, unpaired=("map",))
         self._turn = threading.Lock()
         self._requests = OpenRequests(self)
         action = action_type()
         self._goals = Goals(self, self._requests, action) if action else None
-
-    def stopped(self) -> None:
-        """Forget the inputs, which are latched and arrive again."""
-        self.inputs.clear()
 
     def destroy_node(self) -> None:
         """Withdraw the action, then end the node."""
@@ -109,10 +100,8 @@ class GpSampler(StageNode):
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when all inputs have arrived."""
-        if topic == LANES and not self.config.pair_map:
-            return  # not of the other server's map
         self.inputs.put(topic, data)
-        self._requests.check_waiting()
+        self._requests.waits.check()
         config, messages = self.config, self.inputs.complete()
         if messages and config.generate_on_input:
             self.work(

@@ -47,7 +47,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.recording_part import request_part
 from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
-from scenario_gen.ros.common.stage_node import Inputs, StageNode
+from scenario_gen.ros.common.stage_node import TemplateNode
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, Planned, Road, Segmentation
 
@@ -71,7 +71,7 @@ class Config(Parameters):
     )
 
 
-class Planner(StageNode):
+class Planner(TemplateNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
     INPUTS = ("map", LANES, "tracks", "changepoints")
@@ -82,20 +82,9 @@ class Planner(StageNode):
         super().__init__("planner", Config(), namespace)
         self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
         self._request_count = 0
-        paired = ("tracks", "changepoints")
-        if self.config.pair_map:
-            self.inputs = Inputs((*paired, "map", LANES))
-        else:
-            self.inputs = Inputs(paired, unpaired=("map",))
-
-    def stopped(self) -> None:
-        """Forget the inputs, which are latched and arrive again."""
-        self.inputs.clear()
 
     def received(self, topic: str, data: bytes) -> None:
         """Plan when road, tracks and changepoints of one template have arrived."""
-        if topic == LANES and not self.config.pair_map:
-            return  # not of the other server's map
         self.inputs.put(topic, data)
         messages = self.inputs.complete()
         # Incomplete inputs also replace, and so cancel, the work on the previous ones.
@@ -113,8 +102,6 @@ class Planner(StageNode):
         try:
             planned = whole.plan()
         except RefusedError as error:
-            if not config.fitting.shorten:
-                raise
             plan_part = partial(_plan_part, whole)
             request_part(self, plan_part, encounter, error, config.fitting)
             return
@@ -168,7 +155,6 @@ class Planner(StageNode):
 
 def _plan_part(whole: Chain, part: Encounter) -> Planned:
     """Return a part of a template, planned."""
-    stop_if_cancelled()
     segmentation = _part_of(whole.segmentation, whole.encounter, part)
     return replace(whole, situation=Situation.of(part), segmentation=segmentation).plan()
 

@@ -36,7 +36,7 @@ from scenario_gen.ros.common.recording_part import request_part
 from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import StageNode
-from scenario_gen.types import Encounter, NoteKind
+from scenario_gen.types import NoteKind
 
 
 @dataclass(frozen=True)
@@ -110,10 +110,10 @@ class RoadServer(StageNode):
         try:
             road = build_road(name, encounter, self.config.road)
         except RefusedError as error:
-            if encounter is None or not self.config.fitting.shorten:
+            if encounter is None:
                 raise
-            attempt = partial(self._attempt, name)
-            request_part(self, attempt, encounter, error, self.config.fitting)
+            road_of_part = partial(build_road, name, config=self.config.road)
+            request_part(self, road_of_part, encounter, error, self.config.fitting)
             return
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
         messages = road_messages(road, stamp_ns)
@@ -135,15 +135,6 @@ class RoadServer(StageNode):
             (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
         )
         self.status(level, message, "road", stamp_ns)
-
-    def _attempt(self, name: str, part: Encounter) -> None:
-        """Build the road for a part of the encounter.
-
-        Raises:
-            RefusedError: it does not fit.
-        """
-        stop_if_cancelled()
-        build_road(name, part, self.config.road)
 
     def _get_map(self, _request: Any, response: Any) -> Any:
         if self._grid is not None:

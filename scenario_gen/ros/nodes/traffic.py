@@ -27,7 +27,6 @@ from typing import Any, ClassVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from msg_conventions.autoware import EGO, OBJECTS
@@ -64,12 +63,12 @@ from scenario_gen.ros.common.topics import (
     publish,
     publishing_nodes,
 )
+from scenario_gen.ros.common.waits import POLL_S, Waits
 from scenario_gen.types import tokens
 
 OUTPUTS = ("/clock", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 SOURCE_CHECK_STEPS = 10  # between two checks which nodes command the ego
 FOLLOW_ON_S = 0.5  # real time from the end of a drive in lock-step to the next one
-POLL_S = 0.05  # real time between two checks whether a wait is over
 
 
 class Traffic(Node):  # type: ignore[misc]
@@ -93,10 +92,9 @@ class Traffic(Node):  # type: ignore[misc]
         self._published_ns = 0  # time of its first odometry of the ego
         # Times are on the steady clock [s].
         self._last_reply_at = 0.0
-        self._waiting: Future | None = None
-        self._wait_deadline = 0.0
         self._load_at = math.inf  # when the next scenario begins
-        create_steady_timer(self, POLL_S, self._end_waiting)
+        self.waits = Waits(self)
+        create_steady_timer(self, POLL_S, self._begin_scheduled)
         self._paused = False
         self._sources: list[str] = []
         self.outcomes: list[Outcome] = []  # of finished drives
@@ -231,8 +229,7 @@ class Traffic(Node):  # type: ignore[misc]
         if self._received is not None and command.step < self._received.step:
             return  # it answers an earlier state
         self._received = command
-        if command.step == state.step and self._waiting is not None and not self._waiting.done():
-            self._waiting.set_result(None)
+        self.waits.check()
 
     def _command(self, state: State) -> tuple[Command | Pose | None, str]:
         """Return the command to the ego for a state, and its fault or a note."""
@@ -343,28 +340,19 @@ class Traffic(Node):  # type: ignore[misc]
 
     async def _wait_for_command(self, state: State, patience: float) -> None:
         """Return when a command for this state arrives, or after `patience` [s] of real time."""
-        if self._received is not None and self._received.step >= state.step:
-            return
-        await self._next_command(monotonic() + patience)
 
-    async def _next_command(self, deadline: float) -> None:
-        """Return when a command arrives, or at `deadline` [s] on the steady clock, or before.
+        def is_answered() -> bool:
+            is_last = self._states[-1] is state
+            return not is_last or (
+                self._received is not None and self._received.step >= state.step
+            )
 
-        A wait that is already in progress is shared; it ends at the earlier deadline.
-        """
-        if self._waiting is None or self._waiting.done():
-            self._wait_deadline = deadline
-            self._waiting = Future(executor=self.executor)
-        self._wait_deadline = min(self._wait_deadline, deadline)
-        await self._waiting
+        await self.waits.until(is_answered, monotonic() + patience)
 
-    def _end_waiting(self) -> None:
-        """End the wait for a command at its deadline; begin a scheduled scenario."""
+    def _begin_scheduled(self) -> None:
+        """Begin a scheduled scenario, if it is time."""
         if monotonic() >= self._load_at:
             self._load(self._index + 1)
-        waiting = self._waiting
-        if waiting is not None and not waiting.done() and monotonic() > self._wait_deadline:
-            waiting.set_result(None)
 
     def _step_refusal(self) -> str:
         if not self.config.lock_step:
