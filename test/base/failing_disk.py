@@ -47,15 +47,6 @@ def write_texts(target: Path, size: int) -> None:
             write_text(folder / name, name * size)
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    """Every file below, by name."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
-
-
 class Failing:
     """Calls to the system, counted; `fail` is called with the number of each."""
 

@@ -9,9 +9,10 @@ import os
 from pathlib import Path
 import tempfile
 
-from failing_disk import content, Failing, KIND, write_bag, write_texts
+from failing_disk import Failing, KIND, write_bag, write_texts
 import pytest
 from support.lengths import LONG
+from support.source_files import content
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder

@@ -8,8 +8,9 @@ from pathlib import Path
 import subprocess
 import sys
 
-from failing_disk import content, KIND, write_texts
+from failing_disk import KIND, write_texts
 import pytest
+from support.source_files import content
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import MARKER, NEW, OLD, PREFIX, replaced_folder

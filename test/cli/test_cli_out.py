@@ -14,6 +14,7 @@ import sys
 import time
 
 import pytest
+from support.source_files import content
 
 from scenario_gen.base.folders import PREFIX
 from scenario_gen.logs.synthetic import bundled
@@ -30,19 +31,13 @@ GENERATE = (
 )
 
 
-def files(folder):
-    return {
-        path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()
-    }
-
-
 def test_lookalikes_are_no_earlier_result(run, made, tmp_path):
     """The two that once were lost: a recording, for a scenario of its own, and notes beside a page called report.html."""
     bag = tmp_path / "generated_bag"
     shutil.copytree(made / "bag", bag)
-    before = files(bag)
+    before = content(bag)
     code, said = run("export", made / "bag", "--to", "commonroad", "--out", bag)
-    assert code == 2 and "is not an earlier result" in said and files(bag) == before
+    assert code == 2 and "is not an earlier result" in said and content(bag) == before
     (tmp_path / "page").mkdir()
     (tmp_path / "page" / "report.html").write_text("a report of mine")
     code, said = run(*GENERATE, "--out", "page")
@@ -122,7 +117,7 @@ def started(tmp_path, *words, **options):
 )
 def test_signal_ends_it_and_leaves_nothing(made, tmp_path, number):
     shutil.copytree(made, tmp_path / "out")
-    before = files(tmp_path)
+    before = content(tmp_path)
     process = started(tmp_path, *GENERATE[:5], 10_000, "--out", "out")
     end = time.monotonic() + 300.0
     while (
@@ -133,7 +128,7 @@ def test_signal_ends_it_and_leaves_nothing(made, tmp_path, number):
     _, said = process.communicate()
     assert process.returncode == -number
     assert said.strip() == f"stopped by {number.name}"
-    assert files(tmp_path) == before
+    assert content(tmp_path) == before
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 

@@ -3,7 +3,7 @@
 
 """The readers of logs as targets: tables in text and Parquet, basic safety messages, bags in MCAP and SQLite."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 import json
@@ -15,14 +15,15 @@ from fuzzing.harness import Target
 from fuzzing.mutators import BYTES, TEXT, tree
 import numpy as np
 import pandas as pd
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import Reader, StoragePlugin
+from support.cut_bags import rosbags_bag
 from support.log_builders import crossing
 
 from msg_conventions.autoware import AutowareEncoder
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import TYPE as TRACKS
-from scenario_gen.bags.storage.definitions import TRACKED, type_store
+from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import log_of, READABLE_TYPES, Topic
@@ -133,7 +134,9 @@ def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
             odometry.append((f"/vehicle_{vehicle.id}/odom", ODOMETRY, stamp, message))
     perceived = [("/objects", TRACKED, stamp, data) for stamp, data in objects(encounter)]
     contents = {"s": streams, "t": tracks, "o": odometry, "p": perceived}
-    return [written(folder / name, storage, content) for name, content in contents.items()]
+    return [
+        file_of(rosbags_bag(folder / name, content, storage)) for name, content in contents.items()
+    ]
 
 
 def objects(encounter: Encounter) -> Iterator[tuple[int, bytes]]:
@@ -154,18 +157,8 @@ def objects(encounter: Encounter) -> Iterator[tuple[int, bytes]]:
         yield stamp, encoder.tracked_objects(k, stamp)
 
 
-def written(
-    bag: Path, storage: StoragePlugin, messages: Sequence[tuple[str, str, int, bytes]]
-) -> bytes:
-    """Write messages (topic, type, stamp, CDR bytes) as a bag; return its one file."""
-    with Writer(bag, version=9, storage_plugin=storage) as writer:
-        kinds = {topic: kind for topic, kind, _, _ in messages}
-        connections = {
-            topic: writer.add_connection(topic, kind, typestore=type_store())
-            for topic, kind in kinds.items()
-        }
-        for topic, _, stamp, data in messages:
-            writer.write(connections[topic], stamp, data)
+def file_of(bag: Path) -> bytes:
+    """Return the one file of a bag."""
     (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
     return file.read_bytes()
 

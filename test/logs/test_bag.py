@@ -3,15 +3,16 @@
 
 """Bags, MCAP and SQLite: streams per vehicle, odometry, tracks, and everything that can be wrong with them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 from mcap.writer import Writer as McapWriter
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from support.bag_examples import bag_topics
+from support.cut_bags import rosbags_bag
 from support.log_builders import crossing, geographic, save
 from support.recording_files import tracked
 
@@ -88,15 +89,7 @@ def odometry(rows, topic="/{}/odom", frame="map", child="base_link", late=0.0):
 
 def write(path, lines, plugin=StoragePlugin.MCAP):
     """Write a genuine bag."""
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
-        connections = {}
-        for line in lines:
-            if line.topic not in connections:
-                connections[line.topic] = writer.add_connection(
-                    line.topic, line.type, typestore=STORES
-                )
-            writer.write(connections[line.topic], line.stamp, line.data)
-    return path
+    return rosbags_bag(path, map(astuple, lines), plugin)
 
 
 @pytest.fixture

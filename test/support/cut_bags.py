@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A bag of several small chunks to cut and damage, and what the mcap library says of its chunks."""
+"""Bags by other libraries; a bag of several small chunks to cut and damage, and what the mcap library says of its chunks."""
 
 from collections.abc import Iterable
 from io import BytesIO
@@ -10,8 +10,30 @@ from pathlib import Path
 from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk, StreamReader
 from mcap.writer import Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
 
+from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.bags.storage.writer import BagWriter
+
+
+def rosbags_bag(
+    folder: Path,
+    messages: Iterable[tuple[str, str, int, bytes]],
+    storage: StoragePlugin = StoragePlugin.MCAP,
+    mode: CompressionMode = CompressionMode.NONE,
+) -> Path:
+    """Write messages (topic, type, stamp [ns], CDR bytes) by the rosbags library; return the folder."""
+    writer = RosbagsWriter(folder, version=9, storage_plugin=storage)
+    if mode is not CompressionMode.NONE:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    connections = {}
+    with writer:
+        for topic, kind, stamp_ns, data in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=type_store())
+            writer.write(connections[topic], stamp_ns, data)
+    return folder
 
 
 def small_bag(folder: Path, *, compress: bool) -> Path:

@@ -7,28 +7,18 @@ import contextlib
 import sqlite3
 
 import pytest
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
-from rosbags.typesys import get_typestore, Stores
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 from support.bag_examples import bag_topics
-from support.cut_bags import mcap_bytes
+from support.cut_bags import mcap_bytes, rosbags_bag
 
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-
-
-def written(folder, plugin, mode=CompressionMode.NONE):
-    writer = RosbagsWriter(folder, version=9, storage_plugin=plugin)
-    if mode is not CompressionMode.NONE:
-        writer.set_compression(mode, CompressionFormat.ZSTD)
-    with writer:
-        connection = writer.add_connection("/t", "std_msgs/msg/String", typestore=STORE)
-        for k in range(20):
-            writer.write(connection, 1000 + k, b"\x00\x01\x00\x00" + bytes([k] * 10))
-    return folder
+MESSAGES = [
+    ("/t", "std_msgs/msg/String", 1000 + k, b"\x00\x01\x00\x00" + bytes([k] * 10))
+    for k in range(20)
+]
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
@@ -36,7 +26,7 @@ def written(folder, plugin, mode=CompressionMode.NONE):
     "mode", [CompressionMode.NONE, CompressionMode.FILE, CompressionMode.MESSAGE]
 )
 def test_bags_of_rosbags_are_read(tmp_path, plugin, mode):
-    written(tmp_path / "bag", plugin, mode)
+    rosbags_bag(tmp_path / "bag", MESSAGES, plugin, mode)
     assert [(m.stamp_ns, m.data[-1]) for m in read_messages(tmp_path / "bag")] == [
         (1000 + k, k) for k in range(20)
     ]
@@ -66,7 +56,7 @@ def test_bags_of_rosbags_are_read(tmp_path, plugin, mode):
     ],
 )
 def test_a_changed_database_is_an_error(tmp_path, statement):
-    written(tmp_path / "bag", StoragePlugin.SQLITE3)
+    rosbags_bag(tmp_path / "bag", MESSAGES, StoragePlugin.SQLITE3)
     (file,) = (tmp_path / "bag").glob("*.db3")
     with contextlib.closing(sqlite3.connect(file)) as base:
         base.executescript(

@@ -12,6 +12,7 @@ import pytest
 from rosbags.rosbag2 import Reader
 from support.bag_examples import hand_made_run
 from support.map_builders import lanelet2, opendrive
+from support.source_files import content
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording
@@ -27,20 +28,12 @@ from scenario_gen.output.exchange.export import export_bag, EXPORTS, MANIFEST
 from scenario_gen.pipeline import generate
 
 
-def bytes_of(folder):
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
-
-
 @pytest.mark.parametrize("target", EXPORTS.built_in)
 def test_same_bag_gives_same_bytes(small_bag, tmp_path, target):
     for name in ("one", "two"):
         made = export_bag(small_bag, tmp_path / name, target)
         assert made.scenarios == 4
-    first, second = (bytes_of(tmp_path / name) for name in ("one", "two"))
+    first, second = (content(tmp_path / name) for name in ("one", "two"))
     assert first.keys() == second.keys() and all(
         first[name] == second[name] for name in first if "metadata" not in name
     )

@@ -8,11 +8,8 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
-import pytest
-from support.given import answer, Given
+from support.given import answer
 
-from scenario_gen.logs import read_log
-from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation.evaluate import measured, MEASURED_SCENARIOS
 from scenario_gen.method.sampling import sampler
 from scenario_gen.method.sampling.sampler import (
@@ -21,15 +18,7 @@ from scenario_gen.method.sampling.sampler import (
     LEVELS,
     place_of,
 )
-from scenario_gen.method.segmentation import segment
-from scenario_gen.roads import build_road
 from scenario_gen.types.request import Request
-
-
-@pytest.fixture(scope="module")
-def chain():
-    encounter = read_log([bundled("b")]).encounters[0]
-    return Given(encounter, segment(encounter, seed=7), build_road("t_intersection", encounter), 7)
 
 
 def made(chain, count):
