@@ -24,6 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+from msg_conventions.diagnostics import Level
 from msg_conventions.topics import topic_entry
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
@@ -359,8 +360,8 @@ def yield_to_executor(executor: Executor | None, stop: Callable[[], bool]) -> No
         pass
 
 
-def acknowledgement_warning(node: Node, topic: str, count: int) -> str:
-    """Return the warning for a report of `Pace`.
+def report_pace(node: Any, topic: str, count: int, **values: str) -> None:
+    """Warn on /diagnostics of what a `Pace` reports of a topic, with further values.
 
     A subscriber is not waited for, or may lack `count` messages.
     """
@@ -372,8 +373,9 @@ def acknowledgement_warning(node: Node, topic: str, count: int) -> str:
             "a subscriber may lack them"
         )
     subscribers = sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)})
-    return (
-        f"{message} (subscribers: {', '.join(subscribers) or 'none any more'}); end the "
-        "subscriber "
+    message += (
+        f" (subscribers: {', '.join(subscribers) or 'none any more'}); end the subscriber "
         "that hangs, or raise patience; a new subscriber gets the last 1000"
     )
+    values["count"] = str(count)
+    node.diagnostics.status(Level.WARN, message, f"pace of {topic}", values)

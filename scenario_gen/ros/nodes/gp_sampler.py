@@ -39,7 +39,7 @@ from scenario_gen.ros.common.requests import (
     OpenRequests,
 )
 from scenario_gen.ros.common.stage_node import TemplateNode
-from scenario_gen.ros.common.topics import acknowledgement_warning, other_publishers
+from scenario_gen.ros.common.topics import other_publishers, report_pace
 from scenario_gen.situation import Situation
 from scenario_gen.types import (
     BoundaryStates,
@@ -142,7 +142,7 @@ class GpSampler(TemplateNode):
             if stop():
                 return None
             self._requests.begin(request)
-            report = partial(self._report_pace, request.name)
+            report = partial(report_pace, self, request=request.name)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, report):
                 result, summary = self._answer(messages, request, config, stop)
             message = summary.message()
@@ -230,20 +230,11 @@ class GpSampler(TemplateNode):
         """Publish all messages of an outcome in a namespace of its own."""
         assert result.encounter.decision
         namespace = token(result.encounter.decision.outcome)
-        report = partial(self._report_pace, request.name)
+        report = partial(report_pace, self, request=request.name)
         paced = [f"{namespace}/{topic}" for topic in self.OUTPUTS[:2]]
         with self._turn, self.outputs.paced(paced, config.patience, report):
             for topic, data, _ in result_messages(result, request.name):
                 self.outputs.send_paced(f"{namespace}/{topic}", data, stop)
-
-    def _report_pace(self, request: str, topic: str, count: int) -> None:
-        self.status(
-            Level.WARN,
-            acknowledgement_warning(self, topic, count),
-            f"pace of {topic}",
-            request=request,
-            count=str(count),
-        )
 
 
 @dataclass(eq=False)

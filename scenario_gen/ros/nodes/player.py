@@ -41,12 +41,12 @@ from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import (
-    acknowledgement_warning,
     message_class,
     OVERRIDABLE,
     Pace,
     publish,
     qos,
+    report_pace,
 )
 from scenario_gen.types import Quality
 
@@ -170,7 +170,7 @@ class Player(Node):  # type: ignore[misc]
             message = f"{name} is not played: {error}"
             self.diagnostics.status(Level.ERROR, message, "topics", {"error": "InputError"})
             return
-        pace = Pace(publisher, patience, partial(self._report_pace, name))
+        pace = Pace(publisher, patience, partial(report_pace, self, name))
         self._offered[topic.name] = Offered(
             topic, publisher, pace, deque(maxlen=USUAL_DEPTH_COUNT)
         )
@@ -261,14 +261,6 @@ class Player(Node):  # type: ignore[misc]
         is_full = len(offered.sent_at) == USUAL_DEPTH_COUNT
         self._burst_count += is_full and now - offered.sent_at[0] < BURST_S
         offered.sent_at.append(now)
-
-    def _report_pace(self, topic: str, count: int) -> None:
-        self.diagnostics.status(
-            Level.WARN,
-            acknowledgement_warning(self, topic, count),
-            f"pace of {topic}",
-            {"count": str(count)},
-        )
 
     def _report_progress(self) -> None:
         """Report the time in the bag, each second."""
